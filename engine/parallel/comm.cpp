@@ -1,0 +1,175 @@
+#include "parallel/comm.h"
+
+#include <mpi.h>
+
+#include <algorithm>
+#include <numeric>
+
+namespace bedflow {
+
+struct Comm::Handle {
+  MPI_Comm comm;
+};
+
+namespace {
+
+constexpr int tag = 1;
+
+template <class T>
+T reduce(T value, MPI_Datatype type, MPI_Op op, MPI_Comm comm) {
+  MPI_Allreduce(MPI_IN_PLACE, &value, 1, type, op, comm);
+  return value;
+}
+
+std::vector<int> offsets_of(const std::vector<int>& counts) {
+  std::vector<int> offsets(counts.size(), 0);
+  std::partial_sum(counts.begin(), counts.end() - 1, offsets.begin() + 1);
+  return offsets;
+}
+
+}  // namespace
+
+MpiSession::MpiSession(int* argc, char*** argv) {
+  MPI_Init(argc, argv);
+}
+MpiSession::~MpiSession() {
+  MPI_Finalize();
+}
+
+Comm::Comm(std::shared_ptr<const Handle> handle) : handle_(std::move(handle)) {
+  MPI_Comm_rank(handle_->comm, &rank_);
+  MPI_Comm_size(handle_->comm, &size_);
+}
+Comm Comm::world() {
+  return Comm(std::make_shared<const Handle>(Handle{MPI_COMM_WORLD}));
+}
+Comm Comm::self() {
+  return Comm(std::make_shared<const Handle>(Handle{MPI_COMM_SELF}));
+}
+
+double Comm::sum(double value) const {
+  return size_ == 1 ? value : reduce(value, MPI_DOUBLE, MPI_SUM, handle_->comm);
+}
+std::int64_t Comm::sum(std::int64_t value) const {
+  return size_ == 1 ? value : reduce(value, MPI_INT64_T, MPI_SUM, handle_->comm);
+}
+double Comm::max(double value) const {
+  return size_ == 1 ? value : reduce(value, MPI_DOUBLE, MPI_MAX, handle_->comm);
+}
+std::int64_t Comm::max(std::int64_t value) const {
+  return size_ == 1 ? value : reduce(value, MPI_INT64_T, MPI_MAX, handle_->comm);
+}
+double Comm::min(double value) const {
+  return size_ == 1 ? value : reduce(value, MPI_DOUBLE, MPI_MIN, handle_->comm);
+}
+bool Comm::any(bool value) const {
+  return max(static_cast<std::int64_t>(value)) != 0;
+}
+void Comm::sum(std::span<double> values) const {
+  if (size_ == 1) return;
+  MPI_Allreduce(MPI_IN_PLACE, values.data(), static_cast<int>(values.size()), MPI_DOUBLE, MPI_SUM, handle_->comm);
+}
+
+std::int64_t Comm::sum_before(std::int64_t value) const {
+  std::int64_t before = 0;
+  MPI_Exscan(&value, &before, 1, MPI_INT64_T, MPI_SUM, handle_->comm);
+  return rank_ == 0 ? 0 : before;
+}
+
+void Comm::broadcast(std::span<std::byte> bytes, int from) const {
+  MPI_Bcast(bytes.data(), static_cast<int>(bytes.size()), MPI_BYTE, from, handle_->comm);
+}
+std::string Comm::broadcast(const std::string& text, int from) const {
+  auto length = static_cast<std::int64_t>(text.size());
+  broadcast(std::as_writable_bytes(std::span(&length, 1)), from);
+  std::string result = text;
+  result.resize(static_cast<std::size_t>(length));
+  broadcast(std::as_writable_bytes(std::span(result)), from);
+  return result;
+}
+
+std::vector<std::byte> Comm::gather(std::span<const std::byte> mine) const {
+  int count = static_cast<int>(mine.size());
+  std::vector<int> counts(root() ? size_ : 0);
+  MPI_Gather(&count, 1, MPI_INT, counts.data(), 1, MPI_INT, 0, handle_->comm);
+  std::vector<int> offsets;
+  std::vector<std::byte> all;
+  if (root()) {
+    offsets = offsets_of(counts);
+    all.resize(static_cast<std::size_t>(offsets.back() + counts.back()));
+  }
+  MPI_Gatherv(mine.data(), count, MPI_BYTE, all.data(), counts.data(), offsets.data(), MPI_BYTE, 0, handle_->comm);
+  return all;
+}
+std::vector<std::int64_t> Comm::gather_all(std::int64_t mine) const {
+  std::vector<std::int64_t> all(size_);
+  MPI_Allgather(&mine, 1, MPI_INT64_T, all.data(), 1, MPI_INT64_T, handle_->comm);
+  return all;
+}
+std::vector<double> Comm::gather_all(std::span<const double> mine) const {
+  const int count = static_cast<int>(mine.size());
+  std::vector<int> counts(size_);
+  MPI_Allgather(&count, 1, MPI_INT, counts.data(), 1, MPI_INT, handle_->comm);
+  const std::vector<int> offsets = offsets_of(counts);
+  std::vector<double> all(static_cast<std::size_t>(offsets.back() + counts.back()));
+  MPI_Allgatherv(mine.data(), count, MPI_DOUBLE, all.data(), counts.data(), offsets.data(), MPI_DOUBLE, handle_->comm);
+  return all;
+}
+
+void Comm::exchange(int to, std::span<const double> send, int from, std::vector<double>& receive) const {
+  if (to == rank_ && from == rank_) {
+    receive.assign(send.begin(), send.end());
+    return;
+  }
+  MPI_Request request = MPI_REQUEST_NULL;
+  if (to >= 0) MPI_Isend(send.data(), static_cast<int>(send.size()), MPI_DOUBLE, to, tag, handle_->comm, &request);
+  receive.clear();
+  if (from >= 0) {
+    MPI_Status status;
+    MPI_Probe(from, tag, handle_->comm, &status);
+    int count = 0;
+    MPI_Get_count(&status, MPI_DOUBLE, &count);
+    receive.resize(static_cast<std::size_t>(count));
+    MPI_Recv(receive.data(), count, MPI_DOUBLE, from, tag, handle_->comm, MPI_STATUS_IGNORE);
+  }
+  MPI_Wait(&request, MPI_STATUS_IGNORE);
+}
+void Comm::exchange(int to, std::span<const double> send, int from, std::span<double> receive) const {
+  if (to == rank_ && from == rank_) {
+    std::copy(send.begin(), send.end(), receive.begin());
+    return;
+  }
+  MPI_Sendrecv(send.data(), static_cast<int>(send.size()), MPI_DOUBLE, to < 0 ? MPI_PROC_NULL : to, tag, receive.data(),
+               static_cast<int>(receive.size()), MPI_DOUBLE, from < 0 ? MPI_PROC_NULL : from, tag, handle_->comm,
+               MPI_STATUS_IGNORE);
+}
+
+std::vector<std::vector<double>> Comm::exchange_all(const std::vector<std::vector<double>>& messages) const {
+  std::vector<int> send_counts(size_), receive_counts(size_);
+  std::vector<double> send, receive;
+  for (int r = 0; r < size_; ++r) {
+    send_counts[r] = static_cast<int>(messages[r].size());
+    send.insert(send.end(), messages[r].begin(), messages[r].end());
+  }
+  MPI_Alltoall(send_counts.data(), 1, MPI_INT, receive_counts.data(), 1, MPI_INT, handle_->comm);
+  const std::vector<int> send_offsets = offsets_of(send_counts), receive_offsets = offsets_of(receive_counts);
+  receive.resize(static_cast<std::size_t>(receive_offsets.back() + receive_counts.back()));
+  MPI_Alltoallv(send.data(), send_counts.data(), send_offsets.data(), MPI_DOUBLE, receive.data(), receive_counts.data(),
+                receive_offsets.data(), MPI_DOUBLE, handle_->comm);
+  std::vector<std::vector<double>> result(size_);
+  for (int r = 0; r < size_; ++r) {
+    const auto first = receive.begin() + receive_offsets[r];
+    result[r].assign(first, first + receive_counts[r]);
+  }
+  return result;
+}
+
+void Comm::barrier() const {
+  MPI_Barrier(handle_->comm);
+}
+void Comm::abort(int exit_code) const {
+  MPI_Abort(handle_->comm, exit_code);
+  std::abort();
+}
+
+}  // namespace bedflow

@@ -1,0 +1,70 @@
+// The ranks of a run and what they say to each other. One type, of size 1 in serial; the only mpi.h is in comm.cpp.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace bedflow {
+
+// Starts MPI for the life of main(); errors of MPI end all ranks.
+class MpiSession {
+ public:
+  MpiSession(int* argc, char*** argv);
+  ~MpiSession();
+  MpiSession(const MpiSession&) = delete;
+  MpiSession& operator=(const MpiSession&) = delete;
+};
+
+class Comm {
+ public:
+  static Comm world();
+  static Comm self();
+
+  int rank() const { return rank_; }
+  int size() const { return size_; }
+  bool root() const { return rank_ == 0; }
+
+  // Reductions over all ranks; every rank gets the same bits.
+  double sum(double value) const;
+  std::int64_t sum(std::int64_t value) const;
+  double max(double value) const;
+  std::int64_t max(std::int64_t value) const;
+  double min(double value) const;
+  bool any(bool value) const;
+  void sum(std::span<double> values) const;  // element by element, in place
+
+  // Sum over the ranks below this one; 0 on rank 0.
+  std::int64_t sum_before(std::int64_t value) const;
+
+  void broadcast(std::span<std::byte> bytes, int from = 0) const;
+  std::string broadcast(const std::string& text, int from = 0) const;
+
+  // Every rank's values one after another in rank order, on rank 0 (empty elsewhere) and on all ranks.
+  std::vector<std::byte> gather(std::span<const std::byte> mine) const;
+  std::vector<std::int64_t> gather_all(std::int64_t mine) const;
+  std::vector<double> gather_all(std::span<const double> mine) const;  // any length on each rank
+
+  // Sends one message and receives one of any length. rank -1: nobody there, nothing sent or received.
+  // To and from itself it copies.
+  void exchange(int to, std::span<const double> send, int from, std::vector<double>& receive) const;
+  // The same where the length of what comes is known: receive has it.
+  void exchange(int to, std::span<const double> send, int from, std::span<double> receive) const;
+  // Sends messages[r] to each rank r and returns what each rank sent here, in rank order.
+  std::vector<std::vector<double>> exchange_all(const std::vector<std::vector<double>>& messages) const;
+
+  void barrier() const;
+  [[noreturn]] void abort(int exit_code) const;
+
+ private:
+  struct Handle;
+  explicit Comm(std::shared_ptr<const Handle> handle);
+  std::shared_ptr<const Handle> handle_;
+  int rank_ = 0;
+  int size_ = 1;
+};
+
+}  // namespace bedflow

@@ -1,0 +1,123 @@
+#include <gtest/gtest.h>
+
+#include "base/stop.h"
+#include "grid/halo.h"
+#include "parallel/decomposition.h"
+
+namespace bedflow {
+namespace {
+
+// A value that tells the global cell it belongs to.
+double label(const Grid& g, int i, int j, int k) {
+  const auto wrap = [&](int d, int local) { return (g.first[d] + local + g.global[d]) % g.global[d]; };
+  return wrap(0, i) + 100.0 * wrap(1, j) + 10000.0 * wrap(2, k);
+}
+
+TEST(Decomposition, BlocksCoverEveryCellOnce) {
+  const Decomposition d(Comm::world(), {7, 9, 5}, {0.7, 0.9, 0.5}, {false, true, false});
+  long cells = 1;
+  for (int c : d.cells()) cells *= c;
+  EXPECT_EQ(d.comm().sum(std::int64_t{cells}), 7 * 9 * 5);
+  for (int x = 0; x < 7; ++x)
+    for (int y = 0; y < 9; ++y)
+      for (int z = 0; z < 5; ++z) {
+        const bool mine = x >= d.first()[0] && x < d.first()[0] + d.cells()[0] && y >= d.first()[1] &&
+                          y < d.first()[1] + d.cells()[1] && z >= d.first()[2] && z < d.first()[2] + d.cells()[2];
+        EXPECT_EQ(d.owner({0.1 * x + 0.05, 0.1 * y + 0.05, 0.1 * z + 0.05}) == d.comm().rank(), mine);
+      }
+}
+
+TEST(Decomposition, RanksThatDoNotFitAreRefusedByName) {
+  try {
+    const Decomposition d(Comm::world(), {1, 1, 1}, {1, 1, 1}, {false, false, false}, -1, {2, 2, 2});
+    FAIL() << "nothing was refused";
+  } catch (const Stop& stop) {
+    EXPECT_EQ(stop.reason, Reason::invalid_case);
+    EXPECT_NE(std::string(stop.what()).find("1 x 1 x 1"), std::string::npos);
+  }
+}
+
+TEST(Halo, FillBringsWhatTheOwnerHoldsEdgesAndCornersToo) {
+  for (const int ghosts : {1, 2}) {
+    const Decomposition d(Comm::world(), {8, 8, 8}, {1, 1, 1}, {true, true, true});
+    const Grid grid(d, ghosts);
+    PhaseTimer timer;
+    Halo halo(d, grid, timer);
+    Field f(grid, -1);
+    for (int k = 0; k < grid.cells[2]; ++k)
+      for (int j = 0; j < grid.cells[1]; ++j)
+        for (int i = 0; i < grid.cells[0]; ++i) f(i, j, k) = label(grid, i, j, k);
+    halo.fill(f);
+    for (int k = -ghosts; k < grid.cells[2] + ghosts; ++k)
+      for (int j = -ghosts; j < grid.cells[1] + ghosts; ++j)
+        for (int i = -ghosts; i < grid.cells[0] + ghosts; ++i) ASSERT_EQ(f(i, j, k), label(grid, i, j, k)) << i << " " << j << " " << k;
+  }
+}
+
+TEST(Halo, FillLeavesFacesOfTheBoxAlone) {
+  const Decomposition d(Comm::self(), {3, 3, 3}, {1, 1, 1}, {false, false, false});
+  const Grid grid(d);
+  PhaseTimer timer;
+  Halo halo(d, grid, timer);
+  Field f(grid, 7);
+  halo.fill(f);
+  EXPECT_EQ(f(-1, 1, 1), 7);
+  EXPECT_EQ(f(3, 1, 1), 7);
+}
+
+// <add(a), b> = <a, fill(b)>: integers in the fields, so that the sums are exact.
+TEST(Halo, AddIsTheTransposeOfFill) {
+  const Decomposition d(Comm::world(), {6, 5, 4}, {1, 1, 1}, {true, false, true});
+  const Grid grid(d);
+  PhaseTimer timer;
+  Halo halo(d, grid, timer);
+  Field a(grid), b(grid);
+  unsigned state = 12345u + static_cast<unsigned>(d.comm().rank());
+  const auto next = [&] { return static_cast<double>((state = state * 1664525u + 1013904223u) >> 24); };
+  const auto inside = [&](int dir, int i) {  // a ghost beyond a face of the box takes part in neither
+    return !(i < 0 && d.at_face(dir, 0)) && !(i >= grid.cells[dir] && d.at_face(dir, 1));
+  };
+  const auto product = [&](const Field& p, const Field& q, int g) {
+    double sum = 0;
+    for (int k = -g; k < grid.cells[2] + g; ++k)
+      for (int j = -g; j < grid.cells[1] + g; ++j)
+        for (int i = -g; i < grid.cells[0] + g; ++i)
+          if (inside(0, i) && inside(1, j) && inside(2, k)) sum += p(i, j, k) * q(i, j, k);
+    return d.comm().sum(sum);
+  };
+  for (int k = -1; k <= grid.cells[2]; ++k)
+    for (int j = -1; j <= grid.cells[1]; ++j)
+      for (int i = -1; i <= grid.cells[0]; ++i) {
+        if (inside(0, i) && inside(1, j) && inside(2, k)) a(i, j, k) = next();
+        b(i, j, k) = next();
+      }
+  Field filled = b, added = a;
+  halo.fill(filled);
+  halo.add(added);
+  EXPECT_EQ(product(a, filled, 1), product(added, b, 0));
+}
+
+TEST(Comm, ReductionsAreTheSameOnEveryRank) {
+  const Comm world = Comm::world();
+  const int n = world.size();
+  EXPECT_EQ(world.sum(std::int64_t{world.rank()}), n * (n - 1) / 2);
+  EXPECT_EQ(world.max(static_cast<double>(world.rank())), n - 1);
+  EXPECT_EQ(world.min(static_cast<double>(world.rank())), 0);
+  EXPECT_TRUE(world.any(world.rank() == n - 1));
+  EXPECT_FALSE(world.any(false));
+  EXPECT_EQ(world.sum_before(2), 2 * world.rank());
+  EXPECT_EQ(world.broadcast(world.root() ? "from the root" : ""), "from the root");
+}
+
+TEST(Comm, ExchangeAllDeliversEveryMessage) {
+  const Comm world = Comm::world();
+  std::vector<std::vector<double>> messages(world.size());
+  for (int to = 0; to < world.size(); ++to) messages[to].assign(to + 1, 10.0 * world.rank() + to);
+  const auto received = world.exchange_all(messages);
+  for (int from = 0; from < world.size(); ++from) {
+    EXPECT_EQ(received[from], std::vector<double>(world.rank() + 1, 10.0 * from + world.rank()));
+  }
+}
+
+}  // namespace
+}  // namespace bedflow
