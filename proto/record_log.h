@@ -22,7 +22,8 @@ struct LogRecord {
 
 class LogWriter {
  public:
-  // Opens or creates; cuts off a torn last record; goes on with the next sequence number. Throws std::system_error.
+  // Opens or creates; cuts off a torn last record; goes on with the next sequence number. Throws std::system_error
+  // (EBADMSG: a record in the middle is damaged; nothing is cut then).
   explicit LogWriter(const std::filesystem::path& path);
   ~LogWriter();
   LogWriter(const LogWriter&) = delete;
@@ -34,7 +35,9 @@ class LogWriter {
   void sync();  // fdatasync
 
  private:
+  std::filesystem::path path_;
   int file_ = -1;
+  std::uint64_t end_ = 0;  // bytes of whole records
   std::uint64_t next_sequence_ = 1;
 };
 
@@ -42,13 +45,15 @@ class LogWriter {
 class LogReader {
  public:
   explicit LogReader(std::filesystem::path path) : path_(std::move(path)) {}
-  // Calls `take` for each complete new record. False when a record that is not the last is damaged.
+  // Calls `take` for each complete new record. A log that does not exist yet has none. False when a record that is not the
+  // last is damaged or out of turn; offset() is then its first byte. Throws std::system_error when the file cannot be read.
   bool read(const std::function<void(const LogRecord&)>& take);
   std::uint64_t offset() const { return offset_; }
 
  private:
   std::filesystem::path path_;
   std::uint64_t offset_ = 0;
+  std::uint64_t next_sequence_ = 1;
 };
 
 }  // namespace bedflow

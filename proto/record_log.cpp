@@ -1,0 +1,189 @@
+// The framed, checksummed log. CRC32C (Castagnoli) by ISA-L, which leaves the inversions before and after to its caller.
+#include "record_log.h"
+
+#include <fcntl.h>
+#include <isa-l/crc.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cerrno>
+#include <cstring>
+#include <optional>
+#include <system_error>
+
+namespace bedflow {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "logs are little-endian");
+
+constexpr std::size_t kHeaderBytes = 20;
+constexpr std::size_t kChunkBytes = 1 << 20;
+constexpr std::size_t kMostPayloadBytes = 1 << 28;
+
+[[noreturn]] void fail(int error, const std::string& doing, const std::filesystem::path& path) {
+  throw std::system_error(error, std::generic_category(), doing + " " + path.string());
+}
+
+template <typename T>
+T number_at(std::string_view bytes, std::size_t place) {
+  T value;
+  std::memcpy(&value, bytes.data() + place, sizeof value);
+  return value;
+}
+
+std::string frame(std::uint32_t type, std::uint64_t sequence, std::string_view payload) {
+  std::string bytes(kHeaderBytes + payload.size(), '\0');
+  const auto length = static_cast<std::uint32_t>(payload.size());
+  std::memcpy(bytes.data(), &length, 4);
+  std::memcpy(bytes.data() + 4, &type, 4);
+  std::memcpy(bytes.data() + 8, &sequence, 8);
+  std::copy(payload.begin(), payload.end(), bytes.begin() + kHeaderBytes);
+  const std::uint32_t sum = crc32c(payload, crc32c(std::string_view(bytes).substr(4, 12)));
+  std::memcpy(bytes.data() + 16, &sum, 4);
+  return bytes;
+}
+
+// Bytes of the whole record that starts here by its length field; nothing when even the header is cut.
+std::optional<std::size_t> record_bytes(std::string_view bytes) {
+  if (bytes.size() < kHeaderBytes) return std::nullopt;
+  return kHeaderBytes + number_at<std::uint32_t>(bytes, 0);
+}
+
+bool is_sound(std::string_view bytes) {
+  const auto size = record_bytes(bytes);
+  if (!size || *size > bytes.size()) return false;
+  const std::string_view payload = bytes.substr(kHeaderBytes, *size - kHeaderBytes);
+  return number_at<std::uint32_t>(bytes, 16) == crc32c(payload, crc32c(bytes.substr(4, 12)));
+}
+
+// Whether a sound, later record follows the damage at the start of `bytes`: then the damage is not a torn end.
+bool later_record_follows(std::string_view bytes, std::uint64_t expected) {
+  for (std::size_t place = 1; place + kHeaderBytes <= bytes.size(); ++place) {
+    const std::string_view rest = bytes.substr(place);
+    const auto sequence = number_at<std::uint64_t>(rest, 8);
+    if (sequence > expected && sequence - expected < kMostPayloadBytes && is_sound(rest)) return true;
+  }
+  return false;
+}
+
+class OpenFile {
+ public:
+  OpenFile(const std::filesystem::path& path, int flags) : file_(::open(path.c_str(), flags | O_CLOEXEC)) {}
+  ~OpenFile() {
+    if (file_ >= 0) ::close(file_);
+  }
+  OpenFile(const OpenFile&) = delete;
+  OpenFile& operator=(const OpenFile&) = delete;
+  int get() const { return file_; }
+
+ private:
+  int file_;
+};
+
+std::string bytes_at(int file, std::uint64_t offset, std::size_t most, const std::filesystem::path& path) {
+  struct stat status {};
+  if (::fstat(file, &status) != 0) fail(errno, "reading", path);
+  const auto end = static_cast<std::uint64_t>(status.st_size);
+  most = std::min<std::uint64_t>(most, end - std::min(end, offset));
+  std::string bytes(most, '\0');
+  std::size_t have = 0;
+  while (have < most) {
+    const ssize_t got = ::pread(file, bytes.data() + have, most - have, static_cast<off_t>(offset + have));
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) fail(errno, "reading", path);
+    if (got == 0) break;
+    have += static_cast<std::size_t>(got);
+  }
+  bytes.resize(have);
+  return bytes;
+}
+
+}  // namespace
+
+std::uint32_t crc32c(std::string_view bytes, std::uint32_t so_far) {
+  std::uint32_t sum = ~so_far;
+  while (!bytes.empty()) {  // ISA-L counts in int
+    const std::size_t part = std::min<std::size_t>(bytes.size(), 1 << 30);
+    auto* start = reinterpret_cast<unsigned char*>(const_cast<char*>(bytes.data()));  // its prototype lacks the const
+    sum = crc32_iscsi(start, static_cast<int>(part), sum);
+    bytes.remove_prefix(part);
+  }
+  return ~sum;
+}
+
+LogWriter::LogWriter(const std::filesystem::path& path) : path_(path) {
+  LogReader reader(path);
+  if (!reader.read([&](const LogRecord& record) { next_sequence_ = record.sequence + 1; })) {
+    fail(EBADMSG, "a record in the middle (byte " + std::to_string(reader.offset()) + ") is damaged in", path);
+  }
+  end_ = reader.offset();
+  file_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
+  if (file_ < 0) fail(errno, "opening", path);
+  if (::ftruncate(file_, static_cast<off_t>(end_)) != 0) {
+    const int error = errno;
+    ::close(file_);
+    fail(error, "cutting the torn end of", path);
+  }
+}
+
+LogWriter::~LogWriter() {
+  if (file_ >= 0) ::close(file_);
+}
+
+std::uint64_t LogWriter::append(std::uint32_t type, std::string_view payload) {
+  if (payload.size() > kMostPayloadBytes) fail(EMSGSIZE, "appending to", path_);
+  const std::string bytes = frame(type, next_sequence_, payload);
+  std::size_t written = 0;
+  while (written < bytes.size()) {
+    const ssize_t got = ::write(file_, bytes.data() + written, bytes.size() - written);
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) {
+      const int error = errno;
+      // Part of the record may be there (a disk that is full): without the cut the next record would follow a torn one.
+      if (written > 0 && ::ftruncate(file_, static_cast<off_t>(end_)) != 0)
+        fail(errno, "cutting a half-written record of", path_);
+      fail(error, "appending to", path_);
+    }
+    written += static_cast<std::size_t>(got);
+  }
+  end_ += bytes.size();
+  return next_sequence_++;
+}
+
+void LogWriter::sync() {
+  if (::fdatasync(file_) != 0) fail(errno, "syncing", path_);
+}
+
+bool LogReader::read(const std::function<void(const LogRecord&)>& take) {
+  const OpenFile file(path_, O_RDONLY);
+  if (file.get() < 0) {
+    if (errno == ENOENT) return true;  // not begun yet
+    fail(errno, "opening", path_);
+  }
+  for (std::size_t chunk = kChunkBytes;;) {
+    const std::string bytes = bytes_at(file.get(), offset_, chunk, path_);
+    std::string_view rest = bytes;
+    while (is_sound(rest) && number_at<std::uint64_t>(rest, 8) == next_sequence_) {
+      const std::size_t size = *record_bytes(rest);
+      LogRecord record{number_at<std::uint32_t>(rest, 4), next_sequence_,
+                       std::string(rest.substr(kHeaderBytes, size - kHeaderBytes))};
+      offset_ += size;
+      ++next_sequence_;
+      rest.remove_prefix(size);
+      take(record);
+    }
+    if (rest.empty() && bytes.size() < chunk) return true;
+    const auto size = record_bytes(rest);
+    const bool may_go_on = bytes.size() == chunk && (!size || (*size > rest.size() && *size <= kHeaderBytes + kMostPayloadBytes));
+    if (!may_go_on) {                    // torn or damaged
+      if (is_sound(rest)) return false;  // whole, but with a number out of turn
+      return !later_record_follows(bytes_at(file.get(), offset_, kMostPayloadBytes, path_), next_sequence_);
+    }
+    chunk = std::max(kChunkBytes, size.value_or(0));
+  }
+}
+
+}  // namespace bedflow
