@@ -27,7 +27,7 @@ enum class Reason {
 // alone has seen is kept as a Failure and voted on at the end of the step.
 class Stop : public std::runtime_error {
  public:
-  Stop(Reason reason, const std::string& message) : std::runtime_error(message), reason(reason) {}
+  Stop(Reason why, const std::string& message) : std::runtime_error(message), reason(why) {}
   Reason reason;
 };
 

@@ -25,12 +25,12 @@ struct Grid {
   int ghosts = 1;
 
   Grid() = default;
-  explicit Grid(const Decomposition& decomposition, int ghosts = 1)
+  explicit Grid(const Decomposition& decomposition, int ghost_layers = 1)
       : cells(decomposition.cells()),
         first(decomposition.first()),
         global(decomposition.global_cells()),
         low(decomposition.low()),
-        ghosts(ghosts) {
+        ghosts(ghost_layers) {
     for (int d = 0; d < 3; ++d) spacing[d] = decomposition.size()[d] / global[d];
   }
 

@@ -28,6 +28,9 @@ class Halo {
   struct Slab {
     Int3 low, high;
   };
+  bool own_neighbour(int d) const { return decomposition_.neighbour(d, 0) == decomposition_.comm().rank(); }
+  template <class Apply>
+  void each_own_image(int d, Apply apply) const;
   Slab slab(int d, int from, int to) const;
   void pack(const Field& field, const Slab& slab);
   template <class Apply>

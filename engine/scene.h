@@ -1,0 +1,77 @@
+// A case as the engine sees it: laws, numbers and places, no protobuf. case/ makes it, plan.* decides what of it is built.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "gas/simple.h"
+#include "models/contact.h"
+#include "models/drag.h"
+#include "models/tangential.h"
+#include "particles/dem.h"
+#include "particles/seeding.h"
+#include "statistics/monitors.h"
+
+namespace bedflow {
+
+struct GasScene {
+  GasSetup setup;
+  Vec3 initial_velocity;  // m/s
+};
+
+// Where the particles come from.
+struct Settling {
+  double duration = 0;       // s, at most
+  double rest_velocity = 0;  // m/s, root mean square
+  PairAndWall<LinearSpringDashpot> contact;
+};
+struct RandomPlaces {
+  RandomSeeding seeding;
+  std::optional<Settling> settling;
+};
+using Places = std::variant<RandomPlaces, LatticeSeeding, PlacedSeeding>;
+
+using ContactLaw = std::variant<PairAndWall<LinearSpringDashpot>>;
+using TangentialLaw = std::variant<PairAndWall<Frictionless>, PairAndWall<Coulomb>, PairAndWall<TangentialSpring>>;
+
+struct ParticleScene {
+  std::int64_t count = 0;
+  double diameter = 0;             // m
+  double density = 0;              // kg/m³
+  double mass = 0;                 // kg
+  double collision_time = 0;       // τ, s: the smallest over pairs and walls
+  double steps_per_collision = 0;  // dt_DEM = τ/steps
+  double skin = 0;                 // m; 0: chosen by the plan
+  ContactLaw contact;
+  TangentialLaw tangential;
+  Places places;
+};
+
+struct CouplingScene {
+  Drag drag;
+  bool displacement = true;
+  double fraction_floor = 0.35;
+};
+
+struct Scene {
+  std::string name;
+  Vec3 size;     // m
+  Int3 cells{};  // 0 without gas
+  std::array<bool, 3> periodic{};
+  std::array<std::array<Side, 2>, 3> sides{};  // what the faces are for particles
+  Vec3 gravity;                                // m/s²
+  std::optional<GasScene> gas;
+  std::optional<ParticleScene> particles;
+  std::optional<CouplingScene> coupling;
+  double end_time = 0;                  // s
+  std::optional<double> longest_step;   // s; τ if absent
+  std::optional<double> shortest_step;  // s; longest/1000 if absent
+  std::vector<MonitorSetup> monitors;
+  std::optional<double> plot_interval;  // s
+};
+
+}  // namespace bedflow
