@@ -157,16 +157,18 @@ void LogWriter::sync() {
   if (::fdatasync(file_) != 0) fail(errno, "syncing", path_);
 }
 
-bool LogReader::read(const std::function<void(const LogRecord&)>& take) {
+bool LogReader::read_up_to(std::size_t most, const std::function<void(const LogRecord&)>& take) {
   const OpenFile file(path_, O_RDONLY);
   if (file.get() < 0) {
     if (errno == ENOENT) return true;  // not begun yet
     fail(errno, "opening", path_);
   }
+  std::size_t taken = 0;
   for (std::size_t chunk = kChunkBytes;;) {
     const std::string bytes = bytes_at(file.get(), offset_, chunk, path_);
     std::string_view rest = bytes;
     while (is_sound(rest) && number_at<std::uint64_t>(rest, 8) == next_sequence_) {
+      if (taken++ == most) return true;
       const std::size_t size = *record_bytes(rest);
       LogRecord record{number_at<std::uint32_t>(rest, 4), next_sequence_,
                        std::string(rest.substr(kHeaderBytes, size - kHeaderBytes))};

@@ -47,7 +47,9 @@ class LogReader {
   explicit LogReader(std::filesystem::path path) : path_(std::move(path)) {}
   // Calls `take` for each complete new record. A log that does not exist yet has none. False when a record that is not the
   // last is damaged or out of turn; offset() is then its first byte. Throws std::system_error when the file cannot be read.
-  bool read(const std::function<void(const LogRecord&)>& take);
+  bool read(const std::function<void(const LogRecord&)>& take) { return read_up_to(SIZE_MAX, take); }
+  // The same for at most so many records: a follower with a bound on what it holds.
+  bool read_up_to(std::size_t most, const std::function<void(const LogRecord&)>& take);
   std::uint64_t offset() const { return offset_; }
 
  private:
