@@ -207,7 +207,7 @@ std::vector<double> places_of(const Law& law, const StatisticScene& scene) {
   return {};
 }
 template <class Law>
-void finish(const Law& law, const StatisticScene& scene, std::span<const double> sums, std::span<double> values) {
+void values_from(const Law& law, const StatisticScene& scene, std::span<const double> sums, std::span<double> values) {
   if constexpr (requires { law.finish(scene, sums, values); }) {
     law.finish(scene, sums, values);
   } else {

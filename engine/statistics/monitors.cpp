@@ -117,7 +117,7 @@ void Monitors::evaluate(const Observation& now, double max_overlap, Monitor& m) 
         if constexpr (Law::subject == Subject::step) {
           m.values[0] = law.value({max_overlap, now.mass_residual, now.momentum_residual});
         } else if (present(Law::subject, now)) {
-          finish(law, scene_, std::span(sums_).subspan(m.first_sum, sums_of(law, scene_)), m.values);
+          values_from(law, scene_, std::span(sums_).subspan(m.first_sum, sums_of(law, scene_)), m.values);
         } else {
           std::fill(m.values.begin(), m.values.end(), nothing);
         }

@@ -1,0 +1,88 @@
+#!/usr/bin/env python3
+"""clang-tidy over our sources, in parallel, skipping what was clean before.
+
+usage: tidy.py BUILD_FOLDER
+
+A source is clean for as long as its text, the text of our headers that it includes (as the build recorded them) and .clang-tidy
+are the same: the stamp of that is kept in BUILD_FOLDER/tidy.
+"""
+import concurrent.futures
+import hashlib
+import json
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import time
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+
+
+def sources(build):
+    """Our compiled sources: {path: object file}, without generated code."""
+    entries = json.loads((build / "compile_commands.json").read_text())
+    found = {}
+    for entry in entries:
+        path = pathlib.Path(entry["file"]).resolve()
+        if path.is_relative_to(ROOT) and not path.is_relative_to(build.resolve()):
+            found.setdefault(path, re.search(r" -o (\S+)", entry["command"]).group(1))
+    return found
+
+
+def dependencies(build):
+    """What ninja knows each object file to depend on, within the repository: {object file: [path]}."""
+    listing = subprocess.run(["ninja", "-C", build, "-t", "deps"], capture_output=True, text=True, check=True).stdout
+    found, current = {}, None
+    for line in listing.splitlines():
+        if line and not line.startswith((" ", "ninja:")):
+            current = found.setdefault(line.split(":")[0], [])
+        elif line.strip() and current is not None:
+            path = (build / line.strip()).resolve()
+            if path.is_relative_to(ROOT):
+                current.append(path)
+    return found
+
+
+def stamp(source, included):
+    digest = hashlib.sha256((ROOT / ".clang-tidy").read_bytes())
+    for path in [source, *sorted(included)]:
+        digest.update(str(path).encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()
+
+
+def check(build, source):
+    started = time.monotonic()
+    result = subprocess.run(["clang-tidy", "-p", build, "--quiet", source], capture_output=True, text=True)
+    return result.returncode == 0, result.stdout, time.monotonic() - started
+
+
+def main():
+    build = pathlib.Path(sys.argv[1])
+    clean = build / "tidy"
+    clean.mkdir(parents=True, exist_ok=True)
+    included = dependencies(build)
+    todo = {}
+    for source, object_file in sources(build).items():
+        mark = clean / stamp(source, included.get(object_file, []))
+        if not mark.exists():
+            todo[source] = mark
+    started, faults = time.monotonic(), 0
+    with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
+        jobs = {pool.submit(check, build, source): source for source in todo}
+        for job in concurrent.futures.as_completed(jobs):
+            good, text, seconds = job.result()
+            source = jobs[job]
+            if good:
+                todo[source].touch()
+            else:
+                faults += 1
+                print(f"{source.relative_to(ROOT)}:\n{text}", flush=True)
+            if os.environ.get("BEDFLOW_TIDY_TIMES"):
+                print(f"{seconds:6.1f} s  {source.relative_to(ROOT)}", flush=True)
+    print(f"clang-tidy: {len(todo)} files looked at in {time.monotonic() - started:.0f} s, {faults} with faults")
+    return 1 if faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
