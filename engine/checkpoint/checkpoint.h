@@ -48,17 +48,18 @@ struct CheckpointInfo {
   std::uint64_t bytes = 0;
 };
 
-// Collective. Writes folder/checkpoint_<step, 10 digits>.h5 by way of ….partial: layout by rank 0, posix_fallocate, each rank its
-// slabs by pwrite, fsync, manifest, fsync, verify, rename, fsync of the folder; then removes the oldest beyond `keep`.
-// Throws Stop on every rank alike: disk_full when there is no room (older checkpoints stay), stale_epoch when the folder's
-// newest attempt is above epoch (epoch 0: not checked), internal for other failures of the file system.
+// Collective. Writes folder/checkpoint_<step, 10 digits>.h5 by way of ….partial (file_names.h, seal.h, layout.h): layout by rank
+// 0, posix_fallocate, each rank its slabs by pwrite, fsync, manifest, fsync, verify, rename, fsync of the folder; then removes
+// the oldest beyond `keep`. Throws Stop on every rank alike: disk_full when there is no room (older checkpoints stay),
+// stale_epoch when the folder's newest attempt is above epoch (epoch 0: not checked), internal for other failures of the file
+// system.
 CheckpointInfo write_checkpoint(const Comm& comm, const std::filesystem::path& folder, const CheckpointContent& content, int keep,
                                 std::uint32_t epoch = 0);
 
 // Checks every block of a file against its manifest. Empty: good. Else names dataset and block, one line each.
 std::vector<std::string> verify_checkpoint(const std::filesystem::path& path);
 
-// The complete checkpoints of a folder, newest first, by name; nothing is read.
+// The complete checkpoints of a folder, newest first, by name; nothing is read (time is 0).
 std::vector<CheckpointInfo> list_checkpoints(const std::filesystem::path& folder);
 
 // Newest checkpoint that verifies (rank 0 looks, all are told). What was wrong with newer ones is appended to `faults`.
@@ -75,9 +76,11 @@ class CheckpointReader {
   std::uint64_t step() const;
   double time() const;
   int ranks() const;  // that wrote it
+  bool has_number(const std::string& name) const;
   double number(const std::string& name) const;
   bool has(const std::string& array) const;
   std::string text(const std::string& array) const;
+  // The three below are collective. Part of the grid as asked for, x fastest; global must be the stored shape.
   std::vector<double> grid(const std::string& array, const GridPart& part) const;
   // Rows of this rank: as written if the number of ranks is the same, an even share of all rows otherwise.
   std::vector<double> rows(const std::string& array) const;

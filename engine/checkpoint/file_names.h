@@ -1,0 +1,18 @@
+// Names of checkpoint files: checkpoint_<step, 10 digits>.h5, and while one is written checkpoint_<step>.epoch<attempt>.partial,
+// so that two attempts at a job never write into one file.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+namespace bedflow {
+
+std::string checkpoint_name(std::uint64_t step);
+std::string partial_name(std::uint64_t step, std::uint32_t epoch);
+// Nothing for a file with another kind of name.
+std::optional<std::uint64_t> step_of_checkpoint(const std::filesystem::path& path);
+std::optional<std::uint32_t> attempt_of_partial(const std::filesystem::path& path);
+
+}  // namespace bedflow

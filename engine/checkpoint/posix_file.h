@@ -1,0 +1,48 @@
+// An open file, read and written at places. Every failure is a Stop with the file's name and the system's reason:
+// disk_full where there is no room (device, quota or limit on file sizes), internal otherwise.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <span>
+
+#include "base/stop.h"
+
+namespace bedflow {
+
+class PosixFile {
+ public:
+  enum class Mode { read, write, folder };
+
+  PosixFile(std::filesystem::path path, Mode mode);
+  ~PosixFile();
+  PosixFile(const PosixFile&) = delete;
+  PosixFile& operator=(const PosixFile&) = delete;
+
+  const std::filesystem::path& path() const { return path_; }
+  std::uint64_t bytes() const;
+  // Reads as much as there is; less than asked for only at the file's end. Returns the bytes read.
+  std::size_t read(std::span<std::byte> into, std::uint64_t place) const;
+  void write(std::span<const std::byte> from, std::uint64_t place) const;
+  void reserve(std::uint64_t bytes) const;  // posix_fallocate
+  void sync() const;                        // fsync
+
+ private:
+  [[noreturn]] void fail(const char* what, int error) const;
+
+  std::filesystem::path path_;
+  int descriptor_ = -1;
+};
+
+// The Stop for a system call that failed with `error` (errno).
+Stop system_stop(const std::filesystem::path& path, const char* what, int error);
+
+// Throws disk_full when a file of so many bytes has no room in the folder, by the device's free space and the limit on file
+// sizes.
+void check_room(const std::filesystem::path& folder, std::uint64_t bytes);
+
+// Renames and makes the name last: fsync of the folder.
+void rename_for_good(const std::filesystem::path& from, const std::filesystem::path& to);
+
+}  // namespace bedflow
