@@ -1,0 +1,347 @@
+#include "gas/momentum.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace bedflow {
+
+namespace {
+
+constexpr int most_sweeps = 20;
+
+}  // namespace
+
+Momentum::Momentum(const Decomposition& decomposition, const Grid& grid, Halo& halo, const GasSetup& setup,
+                   const Boundaries& boundaries)
+    : decomposition_(decomposition),
+      grid_(grid),
+      halo_(halo),
+      setup_(setup),
+      boundaries_(boundaries),
+      old_fraction_(grid, 1),
+      fraction_(grid, 1),
+      local_(grid),
+      constant_(grid),
+      push_(grid),
+      flux_(grid),
+      divergence_(grid),
+      mobility_(grid),
+      row_sums_{RowSum(grid.cells[0] + 1), RowSum(grid.cells[0] + 1), RowSum(grid.cells[0] + 1)},
+      coupling_(static_cast<std::size_t>(grid.cells[0]) + 1),
+      row_(static_cast<std::size_t>(grid.cells[0]) + 1),
+      carry_(static_cast<std::size_t>(grid.cells[0]) + 1) {
+  for (Equations& e : equations_) {
+    for (Field& a : e.neighbour) a = Field(grid);
+    e.diagonal = Field(grid);
+    e.source = Field(grid);
+  }
+}
+
+Int3 Momentum::low_solved(int d) const {
+  Int3 low{0, 0, 0};
+  low[d] = boundaries_.first_solved(d);
+  return low;
+}
+
+Int3 Momentum::high_solved(int d) const {
+  Int3 high = grid_.cells;
+  high[d] = boundaries_.last_solved(d) + 1;
+  return high;
+}
+
+bool Momentum::begin(const GasState& state, const FaceField& old_velocity, const Exchange* exchange, double dt) {
+  const double* epsilon = state.fraction.data();
+  const double* rate = state.fraction_rate.data();
+  double* old = old_fraction_.data();
+  for_rows(grid_, [=](auto c, int n) {
+    for (auto i = c; i < c + n; ++i) old[i] = epsilon[i] - dt * rate[i];
+  });
+  boundaries_.continue_field(old_fraction_);
+  halo_.fill(old_fraction_);
+  double least = 1;
+  for (int d = 0; d < 3; ++d) {
+    begin_component(d, state, old_velocity[d], exchange, dt);
+    const double* b = push_[d].data();
+    const double* local = local_[d].data();
+    for_rows(grid_, low_solved(d), high_solved(d), [&](auto c, int n) {
+      for (auto i = c; i < c + n; ++i) least = std::min({least, b[i], local[i]});
+    });
+  }
+  halo_.fill(fraction_);
+  return least > 0;
+}
+
+void Momentum::begin_component(int d, const GasState& state, const Field& old_velocity, const Exchange* exchange, double dt) {
+  const std::ptrdiff_t s = grid_.stride(d);
+  const double inertia = 0.5 * setup_.density * grid_.cell_volume() / dt, area = grid_.face_area(d);
+  const double weight = setup_.density * setup_.gravity[d] * grid_.cell_volume();
+  const double* epsilon = state.fraction.data();
+  const double* old = old_fraction_.data();
+  const double* u = old_velocity.data();
+  double *local = local_[d].data(), *constant = constant_[d].data(), *push = push_[d].data(), *face = fraction_[d].data();
+  Int3 high = grid_.cells;
+  ++high[d];  // the last face too
+  for_rows(grid_, {0, 0, 0}, high, [=](auto c, int n) {
+    for (auto i = c; i < c + n; ++i) {
+      face[i] = 0.5 * (epsilon[i - s] + epsilon[i]);
+      local[i] = inertia * (old[i - s] + old[i]);
+      constant[i] = local[i] * u[i];
+      push[i] = 1;
+    }
+  });
+  const auto forces = [=, this](Int3 from, Int3 to, double share) {  // share: of a cell that the control volume is
+    const double* drag = exchange ? exchange->drag[d].data() : nullptr;
+    const double* momentum = exchange ? exchange->drag_momentum[d].data() : nullptr;
+    const double* buoyancy = exchange ? exchange->buoyancy[d].data() : nullptr;
+    for_rows(grid_, from, to, [=](auto c, int n) {
+      for (auto i = c; i < c + n; ++i) {
+        if (exchange) push[i] = 1 - buoyancy[i];
+        local[i] = share * local[i] + (exchange ? drag[i] : 0);
+        constant[i] = share * (constant[i] + push[i] * weight) + (exchange ? momentum[i] : 0);
+        push[i] *= area;
+      }
+    });
+  };
+  Int3 low = low_solved(d), inside = high_solved(d), edge = inside;
+  if (boundaries_.outflow(d, 0)) {
+    edge[d] = 1;
+    forces(low, edge, 0.5);
+    low[d] = 1;
+  }
+  if (boundaries_.outflow(d, 1)) {
+    Int3 last = low;
+    last[d] = inside[d] - 1;
+    forces(last, inside, 0.5);
+    --inside[d];
+  }
+  forces(low, inside, 1);
+}
+
+// ρg ε u A through every face, ghosts included, and ∇·U in every cell of which both faces are at hand.
+void Momentum::set_fluxes(const FaceField& velocity) {
+  const auto size = static_cast<std::ptrdiff_t>(grid_.size());
+  for (int d = 0; d < 3; ++d) {
+    const double scale = setup_.density * grid_.face_area(d);
+    const double *face = fraction_[d].data(), *u = velocity[d].data();
+    double* flux = flux_[d].data();
+    for (std::ptrdiff_t i = 0; i < size; ++i) flux[i] = scale * face[i] * u[i];
+  }
+  const double *u = velocity[0].data(), *v = velocity[1].data(), *w = velocity[2].data();
+  const double rx = 1 / grid_.spacing.x, ry = 1 / grid_.spacing.y, rz = 1 / grid_.spacing.z;
+  const std::ptrdiff_t sy = grid_.stride(1), sz = grid_.stride(2);
+  double* divergence = divergence_.data();
+  for_rows(grid_, {-1, -1, -1}, grid_.cells, [=](auto c, int n) {
+    for (auto i = c; i < c + n; ++i) divergence[i] = rx * (u[i + 1] - u[i]) + ry * (v[i + sy] - v[i]) + rz * (w[i + sz] - w[i]);
+  });
+}
+
+Momentum::Sums Momentum::assemble(const GasState& state) {
+  set_fluxes(state.velocity);
+  std::fill(coupling_.begin(), coupling_.end(), 0.0);
+  const double* p = state.pressure.data();
+  Sums sums;
+  for (int d = 0; d < 3; ++d) {
+    assemble_inside(d, p);
+    for (int side = 0; side < 2; ++side)
+      if (boundaries_.outflow(d, side)) assemble_outflow(d, side, p);
+    for (int t = 0; t < 3; ++t)
+      for (int side = 0; side < 2; ++side)
+        if (t != d && boundaries_.at(t, side)) apply_boundary(d, t, side);
+    relax(d, state.velocity[d].data(), sums);
+  }
+  sums.coupling = *std::max_element(coupling_.begin(), coupling_.end());
+  return sums;
+}
+
+// Faces with a whole control volume, as if there were no boundaries beside them.
+void Momentum::assemble_inside(int d, const double* p) {
+  const int t1 = (d + 1) % 3, t2 = (d + 2) % 3;
+  const std::ptrdiff_t s = grid_.stride(d), s1 = grid_.stride(t1), s2 = grid_.stride(t2);
+  const double mu = setup_.viscosity, volume = grid_.cell_volume();
+  const auto diffusion = [&](int t) { return mu * volume / (grid_.spacing[t] * grid_.spacing[t]); };
+  const double along = diffusion(d), across1 = diffusion(t1), across2 = diffusion(t2), dilatation = mu * grid_.face_area(d) / 3;
+  const double *f = flux_[d].data(), *f1 = flux_[t1].data(), *f2 = flux_[t2].data(), *divergence = divergence_.data();
+  const double *local = local_[d].data(), *constant = constant_[d].data(), *push = push_[d].data();
+  Equations& e = equations_[d];
+  double *low = e.neighbour[2 * d].data(), *high = e.neighbour[2 * d + 1].data();
+  double *low1 = e.neighbour[2 * t1].data(), *high1 = e.neighbour[2 * t1 + 1].data();
+  double *low2 = e.neighbour[2 * t2].data(), *high2 = e.neighbour[2 * t2 + 1].data();
+  double *diagonal = e.diagonal.data(), *source = e.source.data();
+  Int3 from{0, 0, 0};
+  from[d] = boundaries_.at(d, 0) ? 1 : 0;
+  for_rows(grid_, from, grid_.cells, [=](auto first, int n) {
+#pragma GCC ivdep
+    for (auto c = first; c < first + n; ++c) {
+      low[c] = along + std::max(0.5 * (f[c - s] + f[c]), 0.0);
+      high[c] = along + std::max(-0.5 * (f[c] + f[c + s]), 0.0);
+      low1[c] = across1 + std::max(0.5 * (f1[c - s] + f1[c]), 0.0);
+      high1[c] = across1 + std::max(-0.5 * (f1[c - s + s1] + f1[c + s1]), 0.0);
+      low2[c] = across2 + std::max(0.5 * (f2[c - s] + f2[c]), 0.0);
+      high2[c] = across2 + std::max(-0.5 * (f2[c - s + s2] + f2[c + s2]), 0.0);
+      diagonal[c] = local[c];
+      source[c] = constant[c] + push[c] * (p[c - s] - p[c]) + dilatation * (divergence[c] - divergence[c - s]);
+    }
+  });
+}
+
+// The half control volume before an outflow. Beyond it there is no gradient; what comes back starts from rest.
+void Momentum::assemble_outflow(int d, int side, const double* p) {
+  const std::ptrdiff_t s = grid_.stride(d);
+  const double mu = setup_.viscosity, volume = grid_.cell_volume();
+  const double along = mu * volume / (grid_.spacing[d] * grid_.spacing[d]);
+  const double* f = flux_[d].data();
+  Equations& e = equations_[d];
+  Int3 from{0, 0, 0}, to = grid_.cells;
+  from[d] = side == 0 ? 0 : grid_.cells[d];
+  to[d] = from[d] + 1;
+  for_rows(grid_, from, to, [&](auto first, int n) {
+    for (auto c = first; c < first + n; ++c) {
+      const std::ptrdiff_t cell = side == 0 ? c : c - s;  // the one before the face
+      const double inward = side == 0 ? 0.5 * (f[c] + f[c + s]) : -0.5 * (f[c - s] + f[c]);
+      e.neighbour[2 * d + 1 - side].data()[c] = along + std::max(-inward, 0.0);
+      e.neighbour[2 * d + side].data()[c] = 0;
+      for (int t = 0; t < 3; ++t) {
+        if (t == d) continue;
+        const double across = 0.5 * mu * volume / (grid_.spacing[t] * grid_.spacing[t]);
+        const double* ft = flux_[t].data();
+        e.neighbour[2 * t].data()[c] = across + std::max(0.5 * ft[cell], 0.0);
+        e.neighbour[2 * t + 1].data()[c] = across + std::max(-0.5 * ft[cell + grid_.stride(t)], 0.0);
+      }
+      e.diagonal.data()[c] = local_[d].data()[c] + std::max(side == 0 ? f[c] : -f[c], 0.0);
+      e.source.data()[c] = constant_[d].data()[c] + push_[d].data()[c] * (p[c - s] - p[c]);
+    }
+  });
+}
+
+// Control volumes of component d along a face of the box in direction t: shear over the half cell to a wall or inflow, which
+// have their own velocity; none to a free-slip wall or an outflow. What enters through an outflow brings none.
+void Momentum::apply_boundary(int d, int t, int side) {
+  const Boundary& boundary = *boundaries_.at(t, side);
+  const bool fixed = std::holds_alternative<NoSlip>(boundary) || std::holds_alternative<Inflow>(boundary);
+  const double velocity = std::holds_alternative<NoSlip>(boundary) ? std::get<NoSlip>(boundary).velocity[d] : 0;
+  const double diffusion = setup_.viscosity * grid_.cell_volume() / (grid_.spacing[t] * grid_.spacing[t]);
+  Equations& e = equations_[d];
+  double *a = e.neighbour[2 * t + side].data(), *diagonal = e.diagonal.data(), *source = e.source.data();
+  Int3 from = low_solved(d), to = high_solved(d);
+  from[t] = side == 0 ? 0 : grid_.cells[t] - 1;
+  to[t] = from[t] + 1;
+  const auto apply = [=, this](Int3 low, Int3 high, double share) {
+    const double across = share * diffusion, shear = fixed ? 2 * across : 0;
+    for_rows(grid_, low, high, [=](auto first, int n) {
+      for (auto c = first; c < first + n; ++c) {
+        const double entering = a[c] - across;
+        diagonal[c] += shear + entering;
+        source[c] += (shear + entering) * velocity;
+        a[c] = 0;
+      }
+    });
+  };
+  Int3 inner_from = from, inner_to = to;
+  if (boundaries_.outflow(d, 0)) {
+    Int3 edge = to;
+    edge[d] = 1;
+    apply(from, edge, 0.5);
+    inner_from[d] = 1;
+  }
+  if (boundaries_.outflow(d, 1)) {
+    Int3 edge = from;
+    edge[d] = grid_.cells[d];
+    apply(edge, to, 0.5);
+    inner_to[d] = grid_.cells[d];
+  }
+  apply(inner_from, inner_to, 1);
+}
+
+// To the row above in z; none above the faces of an outflow there, which the field ends with (and whose coefficient is 0).
+std::ptrdiff_t Momentum::step_above(std::ptrdiff_t row, int n) const {
+  const std::ptrdiff_t sz = grid_.stride(2);
+  return row + n + sz <= static_cast<std::ptrdiff_t>(grid_.size()) ? sz : 0;
+}
+
+// Residual of the equations as they are; then Σa/α on the diagonal, the diagonal inverted, and the mobility.
+void Momentum::relax(int d, const double* u, Sums& sums) {
+  Equations& e = equations_[d];
+  const double *a0 = e.neighbour[0].data(), *a1 = e.neighbour[1].data(), *a2 = e.neighbour[2].data(), *a3 = e.neighbour[3].data(),
+               *a4 = e.neighbour[4].data(), *a5 = e.neighbour[5].data();
+  double *diagonal = e.diagonal.data(), *source = e.source.data(), *mobility = mobility_[d].data();
+  const double *push = push_[d].data(), *constant = constant_[d].data(), *face = fraction_[d].data();
+  const std::ptrdiff_t sy = grid_.stride(1), sz = grid_.stride(2);
+  const double keep = 1 / setup_.velocity_relaxation - 1;
+  double* coupling = coupling_.data();
+  double *imbalance = row_sums_[0].clear(), *force = row_sums_[1].clear(), *throughput = row_sums_[2].clear();
+  for_rows(grid_, low_solved(d), high_solved(d), [=, this](auto first, int n) {
+    const std::ptrdiff_t above = step_above(first, n);
+#pragma GCC ivdep
+    for (int i = 0; i < n; ++i) {
+      const std::ptrdiff_t c = first + i;
+      const double transport = a0[c] + a1[c] + a2[c] + a3[c] + a4[c] + a5[c];
+      const double brought =
+          a0[c] * u[c - 1] + a1[c] * u[c + 1] + a2[c] * u[c - sy] + a3[c] * u[c + sy] + a4[c] * u[c - sz] + a5[c] * u[c + above];
+      const double lack = source[c] + brought - (diagonal[c] + transport) * u[c];
+      const double here = diagonal[c] * u[c] - constant[c];
+      const double acting = std::abs(source[c] - constant[c]) + std::abs(here) + transport * std::abs(u[c]);
+      const double still = diagonal[c] + keep * transport;
+      const double inverse = 1 / (still + transport);
+      imbalance[i] += std::abs(lack);
+      force[i] += acting;
+      throughput[i] += face[c] * (std::abs(u[c]) + acting * inverse);
+      source[c] += keep * transport * u[c];
+      diagonal[c] = inverse;
+      coupling[i] = std::max(coupling[i], transport * inverse);
+      mobility[c] = push[c] / still;
+    }
+  });
+  sums.imbalance += row_sums_[0].total();
+  sums.force += row_sums_[1].total();
+  sums.throughput += row_sums_[2].total() * grid_.face_area(d) / grid_.global[d];
+}
+
+// A sweep takes the error down to about coupling² of what it was; a tenth is enough, as the coefficients will change.
+void Momentum::solve(FaceField& velocity, double coupling) {
+  const double wanted = std::log(0.1) / (2 * std::log(std::clamp(coupling, 1e-3, 0.999)));
+  const int sweeps = std::clamp(static_cast<int>(std::ceil(wanted)), 1, most_sweeps);
+  for (int n = 0; n < sweeps; ++n)
+    for (int d = 0; d < 3; ++d) {
+      sweep(d, n % 2 == 0 ? 1 : -1, velocity[d].data());
+      halo_.fill(velocity[d]);
+    }
+}
+
+// One Gauss–Seidel sweep; within a row all but the neighbour just done is gathered first.
+void Momentum::sweep(int d, int direction, double* u) {
+  const Equations& e = equations_[d];
+  const double *a0 = e.neighbour[direction > 0 ? 0 : 1].data(), *a1 = e.neighbour[direction > 0 ? 1 : 0].data(),
+               *a2 = e.neighbour[2].data(), *a3 = e.neighbour[3].data(), *a4 = e.neighbour[4].data(), *a5 = e.neighbour[5].data(),
+               *inverse = e.diagonal.data(), *source = e.source.data();
+  const std::ptrdiff_t sy = grid_.stride(1), sz = grid_.stride(2);
+  double *row = row_.data(), *carry = carry_.data();
+  const Int3 low = low_solved(d), high = high_solved(d);
+  const int n = high[0] - low[0];
+  if (n <= 0) return;
+  const auto sweep_row = [=, this](std::ptrdiff_t c) {
+    const std::ptrdiff_t above = step_above(c, n);
+#pragma GCC ivdep
+    for (int i = 0; i < n; ++i) {
+      const std::ptrdiff_t at = c + i;
+      row[i] = inverse[at] * (source[at] + a1[at] * u[at + direction] + a2[at] * u[at - sy] + a3[at] * u[at + sy] +
+                              a4[at] * u[at - sz] + a5[at] * u[at + above]);
+      carry[i] = inverse[at] * a0[at];
+    }
+    if (direction > 0) {
+      double last = u[c - 1];
+      for (int i = 0; i < n; ++i) u[c + i] = last = row[i] + carry[i] * last;
+    } else {
+      double last = u[c + n];
+      for (int i = n - 1; i >= 0; --i) u[c + i] = last = row[i] + carry[i] * last;
+    }
+  };
+  if (direction > 0) {
+    for (int k = low[2]; k < high[2]; ++k)
+      for (int j = low[1]; j < high[1]; ++j) sweep_row(grid_.index(low[0], j, k));
+  } else {
+    for (int k = high[2] - 1; k >= low[2]; --k)
+      for (int j = high[1] - 1; j >= low[1]; --j) sweep_row(grid_.index(low[0], j, k));
+  }
+}
+
+}  // namespace bedflow

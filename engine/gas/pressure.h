@@ -1,0 +1,51 @@
+// The pressure correction of SIMPLE: p' such that the velocities u' = D (p'_low − p'_high), added, leave no cell out of balance,
+//
+//   Σ_faces ε A D (p'_c − p'_beyond) = −(Σ_faces ε u A outward + V ∂ε/∂t),        D: mobility of a face (Momentum).
+//
+// Symmetric, and solved by conjugate gradients preconditioned by MIC(0). Without an outflow p' is free by a constant: the right
+// side is made to sum to 0, and p' to have no mean.
+#pragma once
+
+#include "gas/boundaries.h"
+#include "gas/incomplete_cholesky.h"
+#include "grid/halo.h"
+#include "grid/rows.h"
+
+namespace bedflow {
+
+class PressureCorrection {
+ public:
+  PressureCorrection(const Decomposition& decomposition, const Grid& grid, Halo& halo, const Boundaries& boundaries);
+
+  void assemble(const FaceField& fraction, const FaceField& mobility);
+  // The right side for a velocity with its ghosts.
+  void set_imbalance(const FaceField& fraction, const FaceField& velocity, const Field& fraction_rate);
+
+  struct Result {
+    int iterations = 0;
+    double imbalance = 0;  // Σ|what the cells lack after the correction| over all ranks, m³/s; not finite: it failed
+  };
+  // Until the residual has come down to `reduction` of the first, or its root mean square to `enough` (m³/s). Collective.
+  Result solve(double reduction, double enough);
+  // Adds u' to the velocity's solved faces and share × p' to the pressure; their ghosts are then out of date.
+  void correct(FaceField& velocity, Field& pressure, const FaceField& mobility, double share);
+
+  const SevenPoint& matrix() const { return matrix_; }
+
+ private:
+  double dot(const Field& a, const Field& b);
+  double multiply();  // product_ = A direction_; returns direction · product, this rank
+  void subtract_mean(Field& field);
+
+  const Decomposition& decomposition_;
+  const Grid& grid_;
+  Halo& halo_;
+  const Boundaries& boundaries_;
+  bool open_;  // p is given somewhere
+  SevenPoint matrix_;
+  IncompleteCholesky preconditioner_;
+  Field correction_, residual_, preconditioned_, direction_, product_;
+  RowSum row_sum_;
+};
+
+}  // namespace bedflow

@@ -1,0 +1,84 @@
+// A box of gas for the tests: decomposition, grid, halo, state and solver together.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <functional>
+#include <string>
+
+#include "gas/simple.h"
+
+namespace bedflow {
+
+struct GasBox {
+  GasBox(Int3 cells, Vec3 size, std::array<bool, 3> periodic, const GasSetup& setup, Comm comm = Comm::self(), int tall = -1)
+      : decomposition(comm, cells, size, periodic, tall),
+        grid(decomposition),
+        halo(decomposition, grid, timer),
+        simple(decomposition, grid, halo, setup, timer),
+        state(grid),
+        exchange(grid) {
+    simple.prepare(state, 0);
+  }
+  GasBox(const GasBox&) = delete;
+  GasBox& operator=(const GasBox&) = delete;
+
+  // One step; with: whether the exchange with particles counts.
+  GasOutcome step(double dt, bool with_exchange = false) {
+    const GasOutcome outcome = simple.advance(state, with_exchange ? &exchange : nullptr, time, dt);
+    if (outcome.converged) time += dt;
+    return outcome;
+  }
+  // Steps until no velocity moves by more than `change` of the fastest in one; false: not within `most` or not converged.
+  bool settle(double dt, double change, int most, bool with_exchange = false) {
+    for (int n = 0; n < most; ++n) {
+      const FaceField before = state.velocity;
+      if (!step(dt, with_exchange).converged) return false;
+      double moved = 0, fastest = 0;
+      for (int d = 0; d < 3; ++d)
+        for (std::size_t i = 0; i < grid.size(); ++i) {
+          moved = std::max(moved, std::abs(state.velocity[d].data()[i] - before[d].data()[i]));
+          fastest = std::max(fastest, std::abs(state.velocity[d].data()[i]));
+        }
+      if (decomposition.comm().max(moved) <= change * decomposition.comm().max(fastest)) return true;
+    }
+    return false;
+  }
+  // What a cell lacks, m³/s: Σ ε u A outward + V ∂ε/∂t.
+  double imbalance(int i, int j, int k) const {
+    const Field &e = state.fraction, *u = state.velocity.component.data();
+    const auto flow = [&](int d, int a, int b, int c) {
+      const int before[3] = {a - (d == 0), b - (d == 1), c - (d == 2)};
+      return grid.face_area(d) * 0.5 * (e(before[0], before[1], before[2]) + e(a, b, c)) * u[d](a, b, c);
+    };
+    return flow(0, i + 1, j, k) - flow(0, i, j, k) + flow(1, i, j + 1, k) - flow(1, i, j, k) + flow(2, i, j, k + 1) -
+           flow(2, i, j, k) + grid.cell_volume() * state.fraction_rate(i, j, k);
+  }
+  void for_cells(const std::function<void(int, int, int)>& act) const {
+    for (int k = 0; k < grid.cells[2]; ++k)
+      for (int j = 0; j < grid.cells[1]; ++j)
+        for (int i = 0; i < grid.cells[0]; ++i) act(i, j, k);
+  }
+  // m, of a cell's centre.
+  double centre(int d, int index) const { return grid.low[d] + (index + 0.5) * grid.spacing[d]; }
+
+  Decomposition decomposition;
+  Grid grid;
+  PhaseTimer timer;
+  Halo halo;
+  Simple simple;
+  GasState state;
+  Exchange exchange;
+  double time = 0;
+};
+
+// Closed by free-slip walls all round, for each test to change.
+inline GasSetup still_air() {
+  GasSetup setup;
+  setup.density = 1.2;
+  setup.viscosity = 1.8e-5;
+  for (auto& pair : setup.faces) pair = {FreeSlip{}, FreeSlip{}};
+  return setup;
+}
+
+}  // namespace bedflow
