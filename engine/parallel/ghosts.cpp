@@ -1,0 +1,102 @@
+#include "parallel/ghosts.h"
+
+#include <algorithm>
+#include <bit>
+#include <sstream>
+
+#include "base/stop.h"
+
+namespace bedflow {
+
+namespace {
+
+constexpr std::size_t row_length = 7;  // id, place, shift
+constexpr const char* direction_names = "xyz";
+
+void put(std::vector<double>& message, Vec3 v) {
+  message.insert(message.end(), {v.x, v.y, v.z});
+}
+
+}  // namespace
+
+GhostExchange::GhostExchange(const Decomposition& decomposition, double reach) : decomposition_(decomposition), reach_(reach) {
+  for (int d = 0; d < 3; ++d) {
+    const double width = decomposition.comm().min(decomposition.high()[d] - decomposition.low()[d]);
+    const bool cut = decomposition.ranks()[d] > 1;
+    if (cut && width < reach) {
+      std::ostringstream message;
+      message << "domain.size." << direction_names[d] << ": cut over " << decomposition.ranks()[d] << " ranks a block is "
+              << width << " m wide, narrower than the " << reach
+              << " m that its particles reach; use fewer ranks or a smaller particles.skin";
+      throw Stop(Reason::invalid_case, message.str());
+    }
+    // Nearer than this a particle would meet two images of the same other one.
+    if (decomposition.periodic(d) && decomposition.size()[d] < 2 * reach) {
+      std::ostringstream message;
+      message << "domain.size." << direction_names[d] << ": " << decomposition.size()[d]
+              << " m is too little for a periodic direction; "
+              << "at least twice the reach of its particles is needed: " << 2 * reach
+              << " m; widen the box or choose a smaller particles.skin";
+      throw Stop(Reason::invalid_case, message.str());
+    }
+  }
+}
+
+void GhostExchange::choose(std::vector<Vec3>& place, std::vector<std::int64_t>& id) {
+  const std::size_t owned = place.size();
+  stages_.clear();
+  shift_.clear();
+  for (int d = 0; d < 3; ++d) {
+    const std::size_t candidates = place.size();  // what comes in this direction is not sent back in it
+    for (int side = 0; side < 2; ++side) pass(d, side, owned, place, id, candidates);
+  }
+}
+
+void GhostExchange::pass(int d, int side, std::size_t owned, std::vector<Vec3>& place, std::vector<std::int64_t>& id,
+                         std::size_t candidates) {
+  Stage stage{decomposition_.neighbour(d, side), decomposition_.neighbour(d, 1 - side), {}, place.size(), 0};
+  if (stage.to < 0 && stage.from < 0) return;
+  send_.clear();
+  if (stage.to >= 0) {
+    const double wrap = decomposition_.wraps(d, side) ? (side == 0 ? 1 : -1) * decomposition_.size()[d] : 0;
+    const double low = decomposition_.low()[d] + reach_, high = decomposition_.high()[d] - reach_;
+    for (std::size_t i = 0; i < candidates; ++i) {
+      Vec3 shift = i < owned ? Vec3{} : shift_[i - owned];
+      const double x = place[i][d] + shift[d];
+      if (side == 0 ? x >= low : x < high) continue;
+      shift[d] += wrap;
+      stage.send.push_back(static_cast<std::uint32_t>(i));
+      send_.push_back(std::bit_cast<double>(id[i]));
+      put(send_, place[i]);
+      put(send_, shift);
+    }
+  }
+  decomposition_.comm().exchange(stage.to, send_, stage.from, receive_);
+  stage.count = receive_.size() / row_length;
+  for (std::size_t i = 0; i < stage.count; ++i) {
+    const double* row = receive_.data() + i * row_length;
+    id.push_back(std::bit_cast<std::int64_t>(row[0]));
+    place.push_back({row[1], row[2], row[3]});
+    shift_.push_back({row[4], row[5], row[6]});
+  }
+  stages_.push_back(std::move(stage));
+}
+
+void GhostExchange::forward(std::span<Vec3* const> arrays) {
+  for (const Stage& stage : stages_) {
+    const std::size_t width = 3 * arrays.size();
+    send_.resize(stage.send.size() * width);
+    receive_.resize(stage.count * width);
+    double* out = send_.data();
+    for (const std::uint32_t i : stage.send)
+      for (const Vec3* array : arrays)
+        for (int d = 0; d < 3; ++d) *out++ = array[i][d];
+    decomposition_.comm().exchange(stage.to, send_, stage.from, std::span(receive_));
+    const double* in = receive_.data();
+    for (std::size_t i = stage.first; i < stage.first + stage.count; ++i)
+      for (Vec3* array : arrays)
+        for (int d = 0; d < 3; ++d) array[i][d] = *in++;
+  }
+}
+
+}  // namespace bedflow

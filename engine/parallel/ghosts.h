@@ -1,0 +1,45 @@
+// Ghost particles: copies of what other blocks, or the other side of a periodic box, have near this block.
+//
+// Staged (Plimpton 1995): across x, then y, then z, each stage passing on what the earlier ones brought, so edges and corners
+// come without messages of their own. A ghost's place stays where its owner has it; how far away its periodic image stands
+// is kept beside it. So both owners of a pair find the same difference of places, to the last bit.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "parallel/decomposition.h"
+
+namespace bedflow {
+
+class GhostExchange {
+ public:
+  // reach: how far from this block ghosts are wanted, m; no block may be narrower (collective; throws Stop(invalid_case)).
+  GhostExchange(const Decomposition& decomposition, double reach);
+
+  // Chooses the ghosts anew by the places of the owned particles (m, as their owners have them) and appends the ghosts' places
+  // and ids.
+  void choose(std::vector<Vec3>& place, std::vector<std::int64_t>& id);
+  // Brings the owned rows of each array to the ghosts that were chosen. Arrays hold owned + ghosts; no allocation.
+  void forward(std::span<Vec3* const> arrays);
+
+  // Of each ghost: what to add to its place to stand beside this block, m.
+  const std::vector<Vec3>& shifts() const { return shift_; }
+
+ private:
+  struct Stage {
+    int to, from;
+    std::vector<std::uint32_t> send;  // rows
+    std::size_t first, count;         // rows received
+  };
+  void pass(int d, int side, std::size_t owned, std::vector<Vec3>& place, std::vector<std::int64_t>& id, std::size_t candidates);
+
+  const Decomposition& decomposition_;
+  double reach_;
+  std::vector<Stage> stages_;
+  std::vector<Vec3> shift_;
+  std::vector<double> send_, receive_;
+};
+
+}  // namespace bedflow

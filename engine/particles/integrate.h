@@ -1,0 +1,34 @@
+// Symplectic Euler: V and ω with the forces at the old place, X with the new V (METHOD: what the MFiX family calls Euler).
+#pragma once
+
+#include <vector>
+
+#include "particles/store.h"
+
+namespace bedflow {
+
+// Advances the owned particles by dt (s) and sets force and torque back to 0. place: of the last rebuild. Returns whether one is
+// further than `limit` (m) from its place, or not a number.
+template <bool rotation, bool gas>
+bool integrate(const DemSetup& setup, ParticleStore& particles, std::vector<Vec3>& force, std::vector<Vec3>& torque,
+               const std::vector<Vec3>& place, double limit, double dt) {
+  const double per_mass = dt / setup.mass, per_inertia = dt / setup.inertia(), limit2 = limit * limit;
+  const Vec3 fall = dt * setup.gravity;
+  bool far = false;
+  for (std::size_t i = 0; i < particles.owned; ++i) {
+    Vec3 total = force[i];
+    if constexpr (gas) total += particles.gas_force[i];
+    particles.velocity[i] += per_mass * total + fall;
+    particles.position[i] += dt * particles.velocity[i];
+    force[i] = {};
+    if constexpr (rotation) {
+      particles.spin[i] += per_inertia * torque[i];
+      torque[i] = {};
+    }
+    const Vec3 moved = particles.position[i] - place[i];
+    far |= !(dot(moved, moved) <= limit2);
+  }
+  return far;
+}
+
+}  // namespace bedflow

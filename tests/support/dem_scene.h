@@ -1,0 +1,98 @@
+// A box of equal spheres for tests: Dem with all that it stands on, and its particles gathered by id.
+#pragma once
+
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <vector>
+
+#include "particles/dem.h"
+#include "particles/seeding.h"
+
+namespace bedflow {
+
+// Müller's spheres (CASES.md) in a box without gravity.
+struct Spheres {
+  double diameter = 1.2e-3, density = 1000, stiffness = 440, restitution = 0.97, friction = 0.1;
+  Vec3 gravity{};
+  double skin = 0.3e-3;
+  std::array<Side, 3> sides{Side::wall, Side::wall, Side::wall};
+
+  double mass() const { return std::numbers::pi / 6 * density * diameter * diameter * diameter; }
+  PairAndWall<LinearSpringDashpot> contact() const {
+    return {LinearSpringDashpot::from_restitution(stiffness, restitution, mass() / 2),
+            LinearSpringDashpot::from_restitution(stiffness, restitution, mass())};
+  }
+  double collision_time() const { return contact().pair.collision_time(mass() / 2); }
+  PairAndWall<Coulomb> coulomb() const { return {{friction}, {friction}}; }
+  PairAndWall<TangentialSpring> spring() const {
+    return {TangentialSpring::from_normal(friction, contact().pair), TangentialSpring::from_normal(friction, contact().wall)};
+  }
+  template <class Law>
+  PairAndWall<Law> law() const {
+    if constexpr (std::is_same_v<Law, Coulomb>) return coulomb();
+    if constexpr (std::is_same_v<Law, TangentialSpring>) return spring();
+    if constexpr (std::is_same_v<Law, Frictionless>) return {};
+  }
+};
+
+struct Particle {
+  Vec3 position, velocity, spin;
+};
+
+template <class Law>
+class Scene {
+ public:
+  Scene(const Comm& comm, Vec3 size, const Spheres& spheres, Int3 cells = {8, 8, 8})
+      : spheres_(spheres),
+        decomposition_(comm, cells, size,
+                       {spheres.sides[0] == Side::periodic, spheres.sides[1] == Side::periodic, spheres.sides[2] == Side::periodic}),
+        dem(decomposition_, setup(spheres), timer) {}
+
+  void place(const std::vector<PlacedSphere>& spheres) { take(seed_placed(decomposition_, spheres)); }
+  void seed(const RandomSeeds& seeds) { take(seed_random(decomposition_, spheres_.diameter / 2, seeds)); }
+  void advance(int substeps, double dt) { dem.template advance(substeps, dt, spheres_.contact(), spheres_.template law<Law>()); }
+  const Decomposition& decomposition() const { return decomposition_; }
+
+  // All particles of all ranks by id, on every rank; places as the owners have them.
+  std::map<std::int64_t, Particle> gathered() const {
+    std::vector<double> mine;
+    const ParticleStore& p = dem.particles();
+    for (std::size_t i = 0; i < p.owned; ++i) {
+      const Vec3 spin = p.spin.empty() ? Vec3{} : p.spin[i];
+      mine.push_back(static_cast<double>(p.id[i]));
+      for (const Vec3 v : {p.position[i], p.velocity[i], spin}) mine.insert(mine.end(), {v.x, v.y, v.z});
+    }
+    const std::vector<double> all = decomposition_.comm().gather_all(mine);
+    std::map<std::int64_t, Particle> result;
+    for (auto row = all.begin(); row != all.end(); row += 10)
+      result[static_cast<std::int64_t>(row[0])] = {
+          {row[1], row[2], row[3]}, {row[4], row[5], row[6]}, {row[7], row[8], row[9]}};
+    return result;
+  }
+
+ private:
+  static DemSetup setup(const Spheres& spheres) {
+    DemSetup result;
+    result.radius = spheres.diameter / 2;
+    result.mass = spheres.mass();
+    result.gravity = spheres.gravity;
+    result.skin = spheres.skin;
+    result.rotation = Law::rotation;
+    result.history = Law::history;
+    for (int d = 0; d < 3; ++d) result.sides[d] = {spheres.sides[d], spheres.sides[d]};
+    return result;
+  }
+  void take(ParticleStore store) {
+    dem.set_particles(std::move(store.position), std::move(store.velocity), std::move(store.spin), std::move(store.id));
+  }
+
+  Spheres spheres_;
+  Decomposition decomposition_;
+
+ public:
+  PhaseTimer timer;
+  Dem dem;
+};
+
+}  // namespace bedflow
