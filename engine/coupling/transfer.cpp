@@ -110,7 +110,12 @@ double Transfer::deposit_volume(const ParticleStore& particles, Field& fraction)
       }
   halo_.fill(fraction);
 
-  // Beyond a face of the box: the cell inside. x, y, z in turn, so that edges and corners follow.
+  mirror_at_faces(fraction);
+  return decomposition_.comm().sum(hidden * grid_.cell_volume());
+}
+
+// x, y, z in turn, so that edges and corners follow.
+void Transfer::mirror_at_faces(Field& field) const {
   const int g = grid_.ghosts;
   for (int d = 0; d < 3; ++d)
     for (int side = 0; side < 2; ++side) {
@@ -122,9 +127,8 @@ double Transfer::deposit_volume(const ParticleStore& particles, Field& fraction)
       for (int k = low[2]; k < high[2]; ++k)
         for (int j = low[1]; j < high[1]; ++j)
           for (int i = low[0]; i < high[0]; ++i)
-            fraction(i, j, k) = fraction(d == 0 ? inside : i, d == 1 ? inside : j, d == 2 ? inside : k);
+            field(i, j, k) = field(d == 0 ? inside : i, d == 1 ? inside : j, d == 2 ? inside : k);
     }
-  return decomposition_.comm().sum(hidden * grid_.cell_volume());
 }
 
 template <class Drag>

@@ -31,6 +31,9 @@ class Transfer {
   // ε at cell centres, ghosts and the cells beyond walls too. Returns the solids volume (m³, all ranks) that the floor hid.
   double deposit_volume(const ParticleStore& particles, Field& fraction);
 
+  // Beyond a face of the box a centre field is what it is in the cell inside.
+  void mirror_at_faces(Field& field) const;
+
   // b of every particle from U and ε at its place, and b, bV and its buoyancy to the faces.
   template <class Drag>
   void deposit_drag(const Drag& drag, const DragScene& scene, const ParticleStore& particles, const GasState& gas,
