@@ -30,10 +30,15 @@ struct Settling {
   PairAndWall<LinearSpringDashpot> contact;
 };
 struct RandomPlaces {
-  RandomSeeding seeding;
+  RandomSeeds seeds;
   std::optional<Settling> settling;
 };
-using Places = std::variant<RandomPlaces, LatticeSeeding, PlacedSeeding>;
+struct LatticePlaces {
+  Int3 count{};
+  Vec3 low, high;  // m
+};
+using PlacedSpheres = std::vector<PlacedSphere>;
+using Places = std::variant<RandomPlaces, LatticePlaces, PlacedSpheres>;
 
 using ContactLaw = std::variant<PairAndWall<LinearSpringDashpot>>;
 using TangentialLaw = std::variant<PairAndWall<Frictionless>, PairAndWall<Coulomb>, PairAndWall<TangentialSpring>>;

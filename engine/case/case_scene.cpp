@@ -1,0 +1,268 @@
+#include "case/case_scene.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "case_file.h"
+
+namespace bedflow {
+
+namespace {
+
+Vec3 vec(const v1::Vector& v) {
+  return {v.x(), v.y(), v.z()};
+}
+
+// ---- gas
+
+Inflow::Jet jet(double velocity, bool has_ramp, const v1::Ramp& ramp) {
+  return has_ramp ? Inflow::Jet{velocity, ramp.from(), ramp.duration()} : Inflow::Jet{velocity, velocity, 0};
+}
+
+Boundary boundary(const v1::Face& face) {
+  switch (face.condition_case()) {
+    case v1::Face::kFreeSlipWall:
+      return FreeSlip{};
+    case v1::Face::kOutflow:
+      return Outflow{face.outflow().pressure()};
+    case v1::Face::kInflow: {
+      const v1::Inflow& from = face.inflow();
+      Inflow inflow{jet(from.velocity(), from.has_ramp(), from.ramp()), {}};
+      for (const v1::Patch& patch : from.patches()) {
+        inflow.patches.push_back({vec(patch.low()), vec(patch.high()), jet(patch.velocity(), patch.has_ramp(), patch.ramp())});
+      }
+      return inflow;
+    }
+    default:
+      return NoSlip{vec(face.no_slip_wall().velocity())};
+  }
+}
+
+using SixFaces = std::array<std::array<const v1::Face*, 2>, 3>;
+SixFaces six_faces(const v1::Faces& f) {
+  return {{{&f.x_low(), &f.x_high()}, {&f.y_low(), &f.y_high()}, {&f.z_low(), &f.z_high()}}};
+}
+
+GasScene gas_scene(const v1::Case& from) {
+  const v1::Gas& gas = from.gas();
+  const v1::Simple& simple = gas.simple();
+  GasScene scene;
+  scene.initial_velocity = vec(gas.initial_velocity());
+  scene.setup = {.density = gas.density(),
+                 .viscosity = gas.viscosity(),
+                 .gravity = vec(from.gravity()),
+                 .faces = {},
+                 .pressure_relaxation = simple.pressure_relaxation(),
+                 .velocity_relaxation = simple.velocity_relaxation(),
+                 .min_iterations = static_cast<int>(simple.min_iterations()),
+                 .max_iterations = static_cast<int>(simple.max_iterations()),
+                 .tolerance = simple.tolerance(),
+                 .pressure_tolerance = simple.pressure_tolerance()};
+  const SixFaces faces = six_faces(from.domain().faces());
+  for (int d = 0; d < 3; ++d)
+    for (int side = 0; side < 2; ++side) scene.setup.faces[d][side] = boundary(*faces[d][side]);
+  return scene;
+}
+
+// ---- particles
+
+// Normal law between particles (m* = m/2) and on walls (m* = m).
+PairAndWall<LinearSpringDashpot> springs(const v1::LinearSpringDashpot& law, double mass, double restitution,
+                                         double wall_restitution) {
+  const double wall_stiffness = law.has_wall_stiffness() ? law.wall_stiffness() : law.stiffness();
+  return {LinearSpringDashpot::from_restitution(law.stiffness(), restitution, mass / 2),
+          LinearSpringDashpot::from_restitution(wall_stiffness, wall_restitution, mass)};
+}
+
+TangentialLaw tangential(const v1::Particles& from, const PairAndWall<LinearSpringDashpot>& normal) {
+  switch (from.tangential_case()) {
+    case v1::Particles::kCoulomb: {
+      const v1::Coulomb& law = from.coulomb();
+      return PairAndWall<Coulomb>{{law.friction()}, {law.has_wall_friction() ? law.wall_friction() : law.friction()}};
+    }
+    case v1::Particles::kSpring: {
+      const v1::TangentialSpring& law = from.spring();
+      const double wall_friction = law.has_wall_friction() ? law.wall_friction() : law.friction();
+      return PairAndWall<TangentialSpring>{
+          TangentialSpring::from_normal(law.friction(), normal.pair, law.stiffness_ratio(), law.damping_ratio()),
+          TangentialSpring::from_normal(wall_friction, normal.wall, law.stiffness_ratio(), law.damping_ratio())};
+    }
+    default:
+      return PairAndWall<Frictionless>{};
+  }
+}
+
+Places places(const v1::Case& from, double mass) {
+  const v1::Particles& particles = from.particles();
+  const Vec3 size{from.domain().size().x(), from.domain().size().y(), from.domain().size().z()};
+  const auto low = [&](bool given, const v1::Box& box) { return given ? vec(box.low()) : Vec3{}; };
+  const auto high = [&](bool given, const v1::Box& box) { return given ? vec(box.high()) : size; };
+  switch (particles.seeding_case()) {
+    case v1::Particles::kPlaced: {
+      PlacedSpheres spheres;
+      for (const v1::Sphere& sphere : particles.placed().spheres()) {
+        spheres.push_back({vec(sphere.position()), vec(sphere.velocity()), vec(sphere.spin())});
+      }
+      return spheres;
+    }
+    case v1::Particles::kLattice: {
+      const v1::Lattice& lattice = particles.lattice();
+      return LatticePlaces{
+          {static_cast<int>(lattice.count().x()), static_cast<int>(lattice.count().y()), static_cast<int>(lattice.count().z())},
+          low(lattice.has_region(), lattice.region()),
+          high(lattice.has_region(), lattice.region())};
+    }
+    default: {
+      const v1::RandomSeeding& random = particles.random();
+      RandomPlaces result{{.count = random.count(),
+                           .seed = random.seed(),
+                           .low = low(random.has_region(), random.region()),
+                           .high = high(random.has_region(), random.region()),
+                           .velocity_deviation = random.velocity_deviation()},
+                          {}};
+      if (random.has_settling()) {
+        const v1::Settling& settling = random.settling();
+        result.settling =
+            Settling{settling.duration(), settling.rest_velocity(),
+                     springs(particles.linear_spring_dashpot(), mass, settling.restitution(), settling.restitution())};
+      }
+      return result;
+    }
+  }
+}
+
+std::int64_t count_of(const v1::Particles& from) {
+  if (from.has_placed()) return from.placed().spheres_size();
+  if (from.has_lattice()) {
+    const v1::Cells& n = from.lattice().count();
+    return static_cast<std::int64_t>(n.x()) * n.y() * n.z();
+  }
+  return from.random().count();
+}
+
+ParticleScene particle_scene(const v1::Case& from) {
+  const v1::Particles& particles = from.particles();
+  const v1::LinearSpringDashpot& law = particles.linear_spring_dashpot();
+  const double d = particles.diameter(), mass = particles.density() * std::numbers::pi / 6 * d * d * d;
+  const auto contact =
+      springs(law, mass, law.restitution(), law.has_wall_restitution() ? law.wall_restitution() : law.restitution());
+  ParticleScene scene;
+  scene.count = count_of(particles);
+  scene.diameter = d;
+  scene.density = particles.density();
+  scene.mass = mass;
+  scene.collision_time = std::min(contact.pair.collision_time(mass / 2), contact.wall.collision_time(mass));
+  scene.steps_per_collision = particles.steps_per_collision();
+  scene.skin = particles.skin();
+  scene.contact = contact;
+  scene.tangential = tangential(particles, contact);
+  scene.places = places(from, mass);
+  return scene;
+}
+
+// ---- coupling, monitors
+
+CouplingScene coupling_scene(const v1::Coupling& from) {
+  CouplingScene scene;
+  scene.displacement = from.displacement();
+  scene.fraction_floor = from.gas_fraction_floor();
+  switch (from.drag_case()) {
+    case v1::Coupling::kErgun:
+      scene.drag = Ergun{};
+      break;
+    case v1::Coupling::kWenYu:
+      scene.drag = WenYu{};
+      break;
+    case v1::Coupling::kConstantDrag:
+      scene.drag = ConstantDrag{from.constant_drag().coefficient()};
+      break;
+    default:
+      scene.drag = GidaspowBlended{};
+  }
+  return scene;
+}
+
+Statistic statistic(const v1::Monitor& from) {
+  constexpr double everywhere = std::numeric_limits<double>::infinity();
+  switch (from.quantity_case()) {
+    case v1::Monitor::kBedHeight:
+      return BedHeight{from.bed_height().above(), from.bed_height().has_depth() ? from.bed_height().depth() : everywhere};
+    case v1::Monitor::kPressureDrop:
+      return PressureDrop{from.pressure_drop().low(), from.pressure_drop().high()};
+    case v1::Monitor::kMassBalance:
+      return MassBalance{};
+    case v1::Monitor::kMomentumBalance:
+      return MomentumBalance{};
+    case v1::Monitor::kMaxOverlap:
+      return MaxOverlap{};
+    case v1::Monitor::kParticleCount:
+      return ParticleCount{};
+    case v1::Monitor::kVoidFraction:
+      return VoidFractionProfile{from.void_fraction().height()};
+    case v1::Monitor::kParticleVelocity: {
+      const v1::VelocityProfile& profile = from.particle_velocity();
+      return VelocityProfile{profile.height(),
+                             profile.half_height(),
+                             static_cast<int>(profile.bins()),
+                             static_cast<int>(profile.component()),
+                             profile.depth_low(),
+                             profile.has_depth_high() ? profile.depth_high() : everywhere};
+    }
+    case v1::Monitor::kParticleMomentum:
+      return ParticleMomentum{static_cast<int>(from.particle_momentum().axis())};
+    default:
+      return KineticEnergy{};
+  }
+}
+
+Side side(const v1::Face& face) {
+  return face.has_outflow() ? Side::open : Side::wall;
+}
+
+Scene make_scene(const v1::Case& from) {
+  Scene scene;
+  scene.name = from.name();
+  scene.size = {from.domain().size().x(), from.domain().size().y(), from.domain().size().z()};
+  if (from.has_gas()) {
+    const v1::Cells& cells = from.domain().cells();
+    scene.cells = {static_cast<int>(cells.x()), static_cast<int>(cells.y()), static_cast<int>(cells.z())};
+    scene.gas = gas_scene(from);
+  }
+  scene.periodic = {from.domain().periodic().x(), from.domain().periodic().y(), from.domain().periodic().z()};
+  const SixFaces faces = six_faces(from.domain().faces());
+  for (int d = 0; d < 3; ++d)
+    for (int s = 0; s < 2; ++s) scene.sides[d][s] = scene.periodic[d] ? Side::periodic : side(*faces[d][s]);
+  scene.gravity = vec(from.gravity());
+  if (from.has_particles()) scene.particles = particle_scene(from);
+  if (from.has_coupling()) scene.coupling = coupling_scene(from.coupling());
+  scene.end_time = from.time().end();
+  if (from.time().has_step()) scene.longest_step = from.time().step();
+  if (from.time().has_shortest_step()) scene.shortest_step = from.time().shortest_step();
+  for (const v1::Monitor& monitor : from.monitors()) {
+    MonitorSetup setup{monitor.name(), statistic(monitor), monitor.interval()};
+    if (monitor.has_averaging()) {
+      setup.averaging_start = monitor.averaging().start();
+      setup.averaging_bin = monitor.averaging().bin();
+      setup.averaging_bins = static_cast<int>(monitor.averaging().bins());
+    }
+    scene.monitors.push_back(std::move(setup));
+  }
+  if (from.output().has_interval()) scene.plot_interval = from.output().interval();
+  return scene;
+}
+
+}  // namespace
+
+Scene read_scene(const std::filesystem::path& case_file) {
+  const CaseRead read = read_case_file(case_file);
+  if (!read.faults.empty()) {
+    std::string all =
+        std::to_string(read.faults.size()) + (read.faults.size() == 1 ? " fault" : " faults") + " in " + case_file.string();
+    for (const CaseFault& fault : read.faults) all += "\n  " + fault.path + ": " + fault.text;
+    throw Stop(Reason::invalid_case, all);
+  }
+  return make_scene(read.value);
+}
+
+}  // namespace bedflow

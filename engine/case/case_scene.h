@@ -1,0 +1,14 @@
+// Case -> scene: the only place of the engine that knows the case's schema.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "scene.h"
+
+namespace bedflow {
+
+// Reads and checks a case file. Throws Stop(invalid_case) with every fault, a line each, by path.
+Scene read_scene(const std::filesystem::path& case_file);
+
+}  // namespace bedflow

@@ -1,0 +1,219 @@
+#include "plan.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+#include <sstream>
+
+namespace bedflow {
+
+namespace {
+
+// Measured by deploy/bench.sh on one core; they make the estimate of the wall time and nothing else.
+constexpr double particle_substep_seconds = 0.09e-6;  // without history; a history adds a third
+constexpr double cell_step_seconds = 1.5e-6;          // two outer iterations of SIMPLE
+
+std::string number(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.4g", value);
+  return text;
+}
+
+bool has_rotation(const TangentialLaw& law) {
+  return !std::holds_alternative<PairAndWall<Frictionless>>(law);
+}
+bool has_history(const TangentialLaw& law) {
+  return std::holds_alternative<PairAndWall<TangentialSpring>>(law);
+}
+
+// The largest superficial velocity that any inflow of the scene reaches, m/s.
+double fastest_inflow(const GasScene& gas) {
+  double fastest = 0;
+  for (const auto& pair : gas.setup.faces)
+    for (const Boundary& face : pair)
+      if (const Inflow* inflow = std::get_if<Inflow>(&face)) {
+        fastest = std::max({fastest, inflow->jet.velocity, inflow->jet.from});
+        for (const Inflow::Patch& patch : inflow->patches) fastest = std::max({fastest, patch.jet.velocity, patch.jet.from});
+      }
+  return fastest;
+}
+
+// Explicit exchange freezes b (U − V) over a gas step: V overshoots U beyond dt = 2m/b. b is taken at the floor of ε and at the
+// slip of the fastest inflow through it.
+double explicit_drag_limit(const Scene& scene) {
+  const double fraction = scene.coupling->fraction_floor;
+  const DragScene drag{scene.gas->setup.density, scene.gas->setup.viscosity, scene.particles->diameter};
+  const double slip = fastest_inflow(*scene.gas) / fraction;
+  const double b = std::visit([&](const auto& law) { return law(drag, slip, fraction); }, scene.coupling->drag);
+  return b > 0 ? 2 * scene.particles->mass / b : 0;
+}
+
+void plan_time(Plan& plan) {
+  const Scene& scene = plan.scene;
+  const double tau = scene.particles ? scene.particles->collision_time : 0;
+  plan.step = scene.longest_step.value_or(tau);
+  if (scene.particles) {
+    plan.substep = std::min(plan.step, tau / scene.particles->steps_per_collision);
+    plan.substeps = static_cast<int>(std::ceil(plan.step / plan.substep - 1e-9));
+  }
+  plan.shortest_step = scene.shortest_step.value_or(plan.step / 1000);
+  plan.steps = static_cast<std::int64_t>(std::ceil(scene.end_time / plan.step - 1e-9));
+  if (plan.shortest_step > plan.step) {
+    throw Stop(Reason::invalid_case, "time.shortest_step = " + number(plan.shortest_step) + " s is longer than the gas step of " +
+                                         number(plan.step) + " s (time.step, or the collision time)");
+  }
+}
+
+void plan_space(Plan& plan) {
+  const Scene& scene = plan.scene;
+  bool shared = plan.ranks > 1;
+  for (int d = 0; d < 3; ++d) shared = shared || scene.periodic[d];
+  plan.ghosts = scene.coupling && shared ? 2 : 1;  // a particle may stand half a skin beyond its block
+  for (int d = 0; d < 3; ++d)
+    if (scene.particles && std::abs(scene.gravity[d]) > 0.5 * norm(scene.gravity)) plan.tall = d;
+  plan.cells = scene.cells;
+  if (scene.particles) {
+    plan.skin = scene.particles->skin > 0 ? scene.particles->skin : 0.2 * scene.particles->diameter;
+    const double reach = scene.particles->diameter + plan.skin;
+    for (int d = 0; d < 3; ++d) {
+      if (!scene.gas) plan.cells[d] = std::max(1, static_cast<int>(scene.size[d] / (2 * scene.particles->diameter)));
+      const double cell = scene.size[d] / plan.cells[d];
+      if (plan.ranks > 1) plan.narrowest[d] = std::max(plan.ghosts, static_cast<int>(std::ceil(reach / cell)));
+      if (scene.periodic[d] && scene.size[d] < 2 * reach) {
+        throw Stop(Reason::invalid_case, "domain.size: " + number(scene.size[d]) +
+                                             " m in a periodic direction is less than twice the " +
+                                             "reach of the particles (particles.diameter + skin = " + number(reach) + " m)");
+      }
+      if (scene.gas && plan.skin / 2 > 0.4 * cell) {
+        throw Stop(Reason::invalid_case, "particles.skin = " + number(plan.skin) + " m is too wide for cells of " + number(cell) +
+                                             " m (domain.cells): at most 0.8 of a cell");
+      }
+    }
+  } else if (plan.ranks > 1) {
+    plan.narrowest = {plan.ghosts, plan.ghosts, plan.ghosts};
+  }
+  plan.cell_count = scene.gas ? static_cast<std::int64_t>(scene.cells[0]) * scene.cells[1] * scene.cells[2] : 0;
+  plan.particle_count = scene.particles ? scene.particles->count : 0;
+}
+
+void plan_cost(Plan& plan) {
+  const Scene& scene = plan.scene;
+  const bool history = scene.particles && has_history(scene.particles->tangential);
+  const bool rotation = scene.particles && has_rotation(scene.particles->tangential);
+  const auto cells = static_cast<double>(plan.cell_count), particles = static_cast<double>(plan.particle_count);
+  // Fields of gas, exchange and pressure solver; arrays and pair list of the particles (about 8 pairs within reach of each).
+  const double field = cells > 0 ? cells * sizeof(double) : 0;
+  plan.memory_bytes = 40e6 * plan.ranks + field * (scene.coupling ? 55 : 40) +
+                      particles * (24.0 * (rotation ? 8 : 5) + 16 + 8 * (4 + (history ? 25 : 0)));
+  plan.checkpoint_bytes = 100e3 + field * 5 + particles * (8 + 24.0 * (rotation ? 4 : 3) + (history ? 3 * 40 : 0));
+  const auto steps = static_cast<double>(plan.steps);
+  plan.seconds = steps *
+                 (cells * cell_step_seconds + particles * plan.substeps * particle_substep_seconds * (history ? 1.33 : 1)) /
+                 plan.ranks;
+}
+
+void plan_parts(Plan& plan) {
+  const Scene& scene = plan.scene;
+  const auto add = [&](const char* part, bool on, const std::string& why) { plan.items.push_back({part, on, why}); };
+  add("gas grid and SIMPLE", scene.gas.has_value(),
+      scene.gas ? std::to_string(scene.cells[0]) + " x " + std::to_string(scene.cells[1]) + " x " +
+                      std::to_string(scene.cells[2]) + " cells"
+                : "the case has no gas");
+  add("particles and contacts", scene.particles.has_value(),
+      scene.particles ? std::to_string(plan.particle_count) + " of d = " + number(scene.particles->diameter) + " m"
+                      : "the case has no particles");
+  if (scene.particles) {
+    const bool rotation = has_rotation(scene.particles->tangential), history = has_history(scene.particles->tangential);
+    add("rotation", rotation, rotation ? "the tangential law turns the particles" : "without friction nothing turns them");
+    add("contact history", history, history ? "the tangential spring remembers" : "the tangential law has no memory");
+    add("radius per particle", false, "all have one size");
+    if (const auto* random = std::get_if<RandomPlaces>(&scene.particles->places)) {
+      add("settling before time 0", random->settling.has_value(),
+          random->settling ? "asked for by the seeding" : "not asked for");
+    }
+  }
+  add("coupling", scene.coupling.has_value(),
+      scene.coupling ? "gas and particles are both there" : "there is only one of the two");
+  if (scene.coupling) {
+    add("displacement of gas, ∂ε/∂t", scene.coupling->displacement,
+        scene.coupling->displacement
+            ? "default"
+            : "coupling.displacement is off: moving particles do not displace gas, as in the paper's code");
+    if (!scene.coupling->displacement)
+      plan.warnings.push_back("coupling.displacement is off: ∂ε/∂t is left out of the gas balance, which is wrong on purpose");
+  }
+  add("messages between ranks", plan.ranks > 1, plan.ranks > 1 ? std::to_string(plan.ranks) + " ranks" : "one rank");
+  add("monitors", !scene.monitors.empty(), std::to_string(scene.monitors.size()) + " in the case");
+  add("plot files", scene.plot_interval.has_value(),
+      scene.plot_interval ? "every " + number(*scene.plot_interval) + " s" : "not asked for");
+}
+
+void check_coupling(Plan& plan) {
+  const Scene& scene = plan.scene;
+  if (!scene.coupling) return;
+  plan.cell_ratio =
+      std::cbrt(scene.size.x * scene.size.y * scene.size.z / static_cast<double>(plan.cell_count)) / scene.particles->diameter;
+  plan.drag_limit = explicit_drag_limit(scene);
+  if (plan.drag_limit > 0 && plan.step > plan.drag_limit) {
+    throw Stop(Reason::invalid_case, "coupling.explicit is unstable beyond dt = 2m/b = " + number(plan.drag_limit) +
+                                         " s (mass of a particle over the heaviest drag in sight), the gas step is " +
+                                         number(plan.step) + " s; set time.step below that");
+  }
+  if (plan.cell_ratio < 1.5 || plan.cell_ratio > 5) {
+    plan.warnings.push_back("cells of Δ* = " + number(plan.cell_ratio) + " diameters: about 2 is the field's rule");
+  }
+}
+
+}  // namespace
+
+Plan make_plan(const Scene& scene, int ranks) {
+  Plan plan;
+  plan.scene = scene;
+  plan.ranks = ranks;
+  plan_space(plan);
+  plan_time(plan);
+  check_coupling(plan);
+  plan_cost(plan);
+  plan_parts(plan);
+  for (const MonitorSetup& monitor : scene.monitors) {
+    const double needed = monitor.averaging_start + monitor.averaging_bin * monitor.averaging_bins;
+    if (monitor.averaging_bin > 0 && needed > scene.end_time * (1 + 1e-9)) {
+      plan.warnings.push_back("monitor " + monitor.name + " asks for " + std::to_string(monitor.averaging_bins) + " bins until " +
+                              number(needed) + " s, the run ends at " + number(scene.end_time) + " s");
+    }
+  }
+  return plan;
+}
+
+std::string Plan::text() const {
+  std::ostringstream out;
+  const auto line = [&](const std::string& name, const std::string& value) {
+    out << "  " << name << std::string(name.size() < 26 ? 26 - name.size() : 1, ' ') << value << "\n";
+  };
+  out << "plan of " << scene.name << " on " << ranks << (ranks == 1 ? " rank\n" : " ranks\n");
+  for (const PlanItem& item : items) {
+    // Names hold letters of more than one byte: pad by what is seen.
+    const auto seen = static_cast<std::size_t>(
+        std::count_if(item.part.begin(), item.part.end(), [](char c) { return (static_cast<unsigned char>(c) & 0xC0) != 0x80; }));
+    out << (item.on ? "  on   " : "  off  ") << item.part << std::string(seen < 29 ? 29 - seen : 1, ' ') << item.why << "\n";
+  }
+  if (scene.particles) {
+    line("collision time tau", number(scene.particles->collision_time) + " s");
+    line("sub-step dt_DEM", number(substep) + " s, " + std::to_string(substeps) + " a step");
+    line("skin of the pair list", number(skin) + " m");
+  }
+  line(scene.gas ? "gas step dt_CFD" : "step", number(step) + " s, not below " + number(shortest_step) + " s");
+  if (cell_ratio > 0) line("cell over particle size", number(cell_ratio) + " (Δ*)");
+  if (drag_limit > 0) line("limit of explicit drag", number(drag_limit) + " s, " + number(drag_limit / step) + " times the step");
+  line("steps", std::to_string(steps) + " to " + number(scene.end_time) + " s");
+  line("cells", std::to_string(cell_count));
+  line("particles", std::to_string(particle_count));
+  line("memory", number(memory_bytes / 1e6) + " MB");
+  line("checkpoint", number(checkpoint_bytes / 1e6) + " MB");
+  line("estimated wall time", number(seconds) + " s");
+  for (const std::string& warning : warnings) out << "  warning: " << warning << "\n";
+  return out.str();
+}
+
+}  // namespace bedflow

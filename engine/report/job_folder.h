@@ -1,0 +1,89 @@
+// The engine's side of the job folder (layout: proto/bedflow/v1/job.proto): what it is told, and what it reports.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/stop.h"
+#include "parallel/comm.h"
+
+namespace bedflow {
+
+// When checkpoints are written, and how long the run may take. Zero: never, no limit.
+struct RunPolicy {
+  std::uint64_t checkpoint_steps = 0;
+  double checkpoint_simulated = 0;  // s
+  double checkpoint_wall = 600;     // s
+  int keep = 2;
+  double wall_limit = 0;  // s
+};
+// From job.txtpb; the defaults of the schema if there is none. Throws Stop(invalid_case) naming line and column.
+RunPolicy read_policy(const std::filesystem::path& folder);
+
+enum class Command { none, checkpoint, suspend, cancel, cancel_now };  // cancel_now: without a checkpoint
+
+struct ProgressReport {
+  std::uint64_t step = 0;
+  double time = 0, step_size = 0, end_time = 0;  // s
+  double wall_seconds = 0, eta_seconds = 0;
+  std::uint64_t substeps = 0, particles = 0;
+  int gas_iterations = 0;
+  const char* phase = "running";
+};
+
+struct MonitorReport {
+  std::string name, unit, meaning;
+  bool profile = false;
+  std::vector<double> places;                     // m
+  double averaging_start = 0, averaging_bin = 0;  // s
+  int averaging_bins = 0;
+};
+
+// Rank 0 writes; on the other ranks every call does nothing. A file that cannot be written is kept as failure(), to be voted on.
+class JobFolder {
+ public:
+  JobFolder(const Comm& comm, std::filesystem::path folder, std::uint32_t epoch);
+  ~JobFolder();
+
+  const std::filesystem::path& path() const { return path_; }
+
+  void started(int ranks, std::uint64_t step, double time, double end_time, const std::string& from_checkpoint,
+               const std::string& plan);
+  void progress(const ProgressReport& now);
+  void checkpoint(const std::string& file, std::uint64_t step, double time, std::uint64_t bytes, double seconds);
+  void info(const std::string& text);
+  void warning(const std::string& text);
+  void error(const std::string& text);
+  void stopped(Reason reason, const std::string& message, std::uint64_t step, double time);
+
+  void statistics_schema(const std::vector<MonitorReport>& monitors);
+  void statistics_resumed(std::uint64_t step);
+  void sample(std::size_t monitor, std::uint64_t step, double time, double value);
+  void bin(std::size_t monitor, int bin, std::uint64_t step, std::span<const double> mean, std::span<const double> deviation);
+  void sync();  // both logs to the disk: before a checkpoint is told of
+
+  // Touches the heartbeat and takes control.txtpb (renames it to control.obeyed.txtpb), at most every 100 ms.
+  Command poll();
+
+  const Failure& failure() const { return failure_; }
+
+ private:
+  struct Logs;
+  template <class Write>
+  void append(Write write);
+  void log_line(int severity, const std::string& text);
+
+  std::filesystem::path path_;
+  std::uint32_t epoch_;
+  std::unique_ptr<Logs> logs_;  // rank 0 only
+  Failure failure_;
+  std::chrono::steady_clock::time_point last_poll_{};
+};
+
+}  // namespace bedflow

@@ -1,0 +1,337 @@
+#include "run.h"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <sstream>
+#include <system_error>
+
+#include "case/case_scene.h"
+#include "plots.h"
+#include "report/job_folder.h"
+#include "simulation.h"
+#include "statistics/monitors.h"
+#include "summary.h"
+
+namespace bedflow {
+
+namespace {
+
+volatile std::sig_atomic_t signal_checkpoint = 0, signal_stop = 0;
+
+void listen_to_signals() {
+  std::signal(SIGUSR1, [](int) { signal_checkpoint = 1; });
+  std::signal(SIGTERM, [](int) { signal_stop = 1; });
+  std::signal(SIGINT, [](int) { signal_stop = 1; });
+}
+
+// What the ranks agree on once a step.
+struct Agreement {
+  Failure failure;
+  bool checkpoint = false, suspend = false, cancel = false, cancel_now = false, wall_limit = false;
+};
+
+class Run {
+ public:
+  Run(const Comm& comm, const RunOptions& options)
+      : comm_(comm), options_(options), policy_(read_policy(options.folder)), folder_(comm, options.folder, options.epoch) {}
+
+  Reason run() {
+    Stop outcome(Reason::finished, "the end time is reached");
+    try {
+      start();
+      outcome = advance_to_end();
+    } catch (const Stop& stop) {
+      outcome = stop;
+    }
+    finish(outcome);
+    return outcome.reason;
+  }
+
+ private:
+  // ---- the parts of a run, in order
+
+  void start() {
+    const Plan plan = make_plan(read_scene(options_.folder / "case.txtpb"), comm_.size());
+    simulation_ = std::make_unique<Simulation>(plan, comm_, timer_);
+    monitors_ = std::make_unique<Monitors>(simulation_->decomposition(), plan.scene.monitors, sink());
+    plan_ = plan;
+    const std::string from = resume();
+    folder_.started(comm_.size(), simulation_->steps(), simulation_->time(), plan.scene.end_time, from, plan.text());
+    for (const std::string& warning : plan.warnings) folder_.warning(warning);
+    for (const std::string& fault : checkpoint_faults_) folder_.warning(fault);
+    report_schema();
+    if (!from.empty()) {
+      folder_.statistics_resumed(simulation_->steps());
+      return;
+    }
+    folder_.statistics_resumed(0);  // an earlier attempt that never got to a checkpoint is void
+    settle();
+    timer_ = PhaseTimer();  // the summary is of the steps
+    monitors_->observe(simulation_->observation(), 0, 0, 0);
+    write_plots();
+    write_checkpoint_now();  // settling is never done twice
+  }
+
+  // Takes up the newest good checkpoint, or the one asked for. Empty: there is none.
+  std::string resume() {
+    const auto checkpoints = options_.folder / "checkpoints";
+    std::optional<CheckpointInfo> found;
+    if (options_.from) {
+      char name[40];
+      std::snprintf(name, sizeof name, "checkpoint_%010llu.h5", static_cast<unsigned long long>(*options_.from));
+      found = CheckpointInfo{checkpoints / name, *options_.from, 0, 0};
+    } else {
+      found = newest_good_checkpoint(comm_, checkpoints, checkpoint_faults_);
+      if (!found && !checkpoint_faults_.empty()) {
+        throw Stop(Reason::checkpoint_corrupt,
+                   "no checkpoint of " + checkpoints.string() + " is good: " + checkpoint_faults_.front());
+      }
+    }
+    if (!found) {
+      simulation_->seed();
+      return "";
+    }
+    const CheckpointReader reader(comm_, found->path);
+    simulation_->restore(reader);
+    restore_statistics(reader);
+    last_checkpoint_time_ = simulation_->time();
+    last_checkpoint_step_ = simulation_->steps();
+    next_plot_ =
+        plan_.scene.plot_interval ? static_cast<std::int64_t>(simulation_->time() / *plan_.scene.plot_interval + 1e-9) + 1 : 0;
+    return found->path.filename().string();
+  }
+
+  // Statistics go on where the checkpoint left them, unless the case asks for others than it did.
+  void restore_statistics(const CheckpointReader& reader) {
+    if (reader.text("statistics/monitors") != monitors_signature()) {
+      folder_.info("the monitors are not those of the checkpoint: statistics begin here");
+      return;
+    }
+    const std::string state = reader.text("statistics/state");
+    std::vector<double> values(state.size() / sizeof(double));
+    std::memcpy(values.data(), state.data(), values.size() * sizeof(double));
+    monitors_->restore(values);
+  }
+  std::string monitors_signature() const {
+    std::ostringstream text;
+    text.precision(17);
+    for (std::size_t m = 0; m < monitors_->size(); ++m) {
+      const MonitorSetup& setup = monitors_->setup(m);
+      text << setup.name << ' ' << monitors_->meaning(m) << ' ' << monitors_->places(m).size() << ' ' << setup.interval << ' '
+           << setup.averaging_start << ' ' << setup.averaging_bin << ' ' << setup.averaging_bins << '\n';
+    }
+    return std::move(text).str();
+  }
+
+  void settle() {
+    while (simulation_->settle()) {
+      const Agreement agreed = agree();
+      if (agreed.failure) throw Stop(agreed.failure.reason, "while settling: " + agreed.failure.message);
+      if (agreed.cancel || agreed.cancel_now) throw Stop(Reason::cancelled, "cancelled while settling");
+      if (agreed.suspend) throw Stop(Reason::suspended, "suspended while settling; it begins anew when resumed");
+      report_progress("settling");
+    }
+    settling_seconds_ = timer_.seconds();
+    if (simulation_->settled_time() > 0) {
+      folder_.info("the particles were given " + std::to_string(simulation_->settled_time()) + " s to settle");
+    }
+  }
+
+  Stop advance_to_end() {
+    while (!simulation_->finished()) {
+      simulation_->step();
+      count_step();
+      {
+        const PhaseTimer::Scope scope(timer_, Phase::statistics, simulation_->particle_count());
+        monitors_->observe(simulation_->observation(), simulation_->steps(), simulation_->time(), simulation_->last_step(),
+                           simulation_->finished());
+      }
+      for (const std::string& note : simulation_->take_notes()) folder_.info(note);
+      write_plots_due();
+      report_progress("running");
+      const Agreement agreed = agree();
+      if (agreed.failure) return {agreed.failure.reason, agreed.failure.message};
+      if (agreed.cancel_now) return {Reason::cancelled, "cancelled without a checkpoint"};
+      if (agreed.checkpoint || agreed.suspend || agreed.cancel || agreed.wall_limit) write_checkpoint_now();
+      if (agreed.cancel) return {Reason::cancelled, "cancelled; the last checkpoint is kept"};
+      if (agreed.suspend) return {Reason::suspended, "suspended at a checkpoint"};
+      if (agreed.wall_limit)
+        return {Reason::wall_limit, "the wall limit of the job is over; a checkpoint is there: resume the job with a longer one"};
+    }
+    if (last_checkpoint_step_ != simulation_->steps()) write_checkpoint_now();
+    return {Reason::finished, "the end time is reached"};
+  }
+
+  void finish(const Stop& outcome) {
+    const std::uint64_t steps = simulation_ ? simulation_->steps() : 0;
+    const double time = simulation_ ? simulation_->time() : 0;
+    if (simulation_) {
+      totals_.reason = outcome.reason;
+      totals_.settling_seconds = settling_seconds_;
+      if (const Dem* dem = simulation_->particles()) totals_.list_rebuilds = static_cast<std::uint64_t>(dem->rebuilds());
+      try {
+        write_summary(comm_, options_.folder / "summary.json", plan_, timer_, totals_);
+      } catch (const std::system_error& error) {
+        folder_.warning(std::string("summary.json could not be written: ") + error.what());
+      }
+    }
+    if (outcome.reason != Reason::finished && outcome.reason != Reason::suspended && outcome.reason != Reason::cancelled) {
+      folder_.error(outcome.what());
+    }
+    folder_.stopped(outcome.reason, outcome.what(), steps, time);
+    comm_.barrier();  // the last event is there before any rank is gone
+  }
+
+  // ---- once a step
+
+  // One reduction: does any rank report a failure, a signal or a command?
+  Agreement agree() {
+    Failure mine = simulation_->failure();
+    if (!mine) mine = folder_.failure();
+    const Command command = folder_.poll();
+    std::array<double, 6> flags{};
+    flags[0] = static_cast<bool>(mine);
+    flags[1] = command == Command::checkpoint || signal_checkpoint || checkpoint_due();
+    flags[2] = command == Command::suspend || signal_stop;
+    flags[3] = command == Command::cancel;
+    flags[4] = command == Command::cancel_now;
+    flags[5] = comm_.root() && policy_.wall_limit > 0 && wall_seconds() > policy_.wall_limit;
+    signal_checkpoint = 0;
+    comm_.sum(flags);
+    Agreement agreed{{}, flags[1] > 0, flags[2] > 0, flags[3] > 0, flags[4] > 0, flags[5] > 0};
+    if (flags[0] > 0) {
+      const int first = static_cast<int>(comm_.min(mine ? comm_.rank() : comm_.size()));
+      auto reason = static_cast<int>(mine.reason);
+      comm_.broadcast(std::as_writable_bytes(std::span(&reason, 1)), first);
+      agreed.failure = {static_cast<Reason>(reason), comm_.broadcast(mine.message, first)};
+    }
+    return agreed;
+  }
+
+  bool checkpoint_due() const {
+    if (!comm_.root()) return false;
+    const std::uint64_t step = simulation_->steps();
+    const bool by_steps = policy_.checkpoint_steps > 0 && step - last_checkpoint_step_ >= policy_.checkpoint_steps;
+    const bool by_time = policy_.checkpoint_simulated > 0 &&
+                         simulation_->time() - last_checkpoint_time_ >= policy_.checkpoint_simulated * (1 - 1e-9);
+    const bool by_wall = policy_.checkpoint_wall > 0 && wall_seconds() - last_checkpoint_wall_ >= policy_.checkpoint_wall;
+    return by_steps || by_time || by_wall;
+  }
+
+  void count_step() {
+    ++totals_.steps;
+    totals_.simulated_seconds += simulation_->last_step();
+    totals_.substeps = simulation_->substeps();
+    totals_.particle_substeps = simulation_->substeps() * static_cast<std::uint64_t>(simulation_->particle_count());
+    totals_.cell_steps += static_cast<std::uint64_t>(plan_.cell_count);
+    totals_.gas_iterations += static_cast<std::uint64_t>(simulation_->gas_outcome().iterations);
+    totals_.pressure_iterations += static_cast<std::uint64_t>(simulation_->gas_outcome().pressure_iterations);
+  }
+
+  void report_progress(const char* phase) {
+    if (wall_seconds() - last_progress_ < 0.5 && last_progress_ > 0 && !simulation_->finished()) return;
+    last_progress_ = wall_seconds();
+    const double done = totals_.simulated_seconds, left = plan_.scene.end_time - simulation_->time();
+    const double speed = done / std::max(1e-9, wall_seconds() - settling_seconds_);
+    folder_.progress({.step = simulation_->steps(),
+                      .time = simulation_->time(),
+                      .step_size = simulation_->step_size(),
+                      .end_time = plan_.scene.end_time,
+                      .wall_seconds = wall_seconds(),
+                      .eta_seconds = done > 0 ? std::max(0.0, left / speed) : 0,
+                      .substeps = simulation_->substeps(),
+                      .particles = static_cast<std::uint64_t>(simulation_->particle_count()),
+                      .gas_iterations = simulation_->gas_outcome().iterations,
+                      .phase = phase});
+  }
+
+  // ---- what is written
+
+  void write_checkpoint_now() {
+    const PhaseTimer::Scope scope(timer_, Phase::checkpoint);
+    const double before = wall_seconds();
+    CheckpointContent content = simulation_->checkpoint();
+    const std::vector<double> state = monitors_->state();
+    const auto bytes = std::as_bytes(std::span(state));
+    content.arrays.push_back({"statistics/state",
+                              "",
+                              "sums of the monitors, in the order of the case",
+                              std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()),
+                              {},
+                              1});
+    content.arrays.push_back({"statistics/monitors", "", "what the sums belong to", monitors_signature(), {}, 1});
+    content.arrays.push_back({"case", "", "the effective case, protobuf text format", case_text(), {}, 1});
+    folder_.sync();  // statistics up to here are on the disk before the checkpoint is
+    const CheckpointInfo info = write_checkpoint(comm_, options_.folder / "checkpoints", content, policy_.keep, options_.epoch);
+    last_checkpoint_step_ = simulation_->steps();
+    last_checkpoint_time_ = simulation_->time();
+    last_checkpoint_wall_ = wall_seconds();
+    folder_.checkpoint(info.path.filename().string(), info.step, info.time, info.bytes, wall_seconds() - before);
+  }
+
+  std::string case_text() const {
+    std::ifstream file(options_.folder / "case.txtpb");
+    std::ostringstream text;
+    text << file.rdbuf();
+    return std::move(text).str();
+  }
+
+  void write_plots_due() {
+    if (plan_.scene.plot_interval &&
+        simulation_->time() >= static_cast<double>(next_plot_) * *plan_.scene.plot_interval - 1e-9 * simulation_->last_step()) {
+      write_plots();
+    }
+  }
+  void write_plots() {
+    if (!plan_.scene.plot_interval) return;
+    const PhaseTimer::Scope scope(timer_, Phase::output);
+    write_plot_files(comm_, options_.folder / "plots", *simulation_);
+    next_plot_ = static_cast<std::int64_t>(simulation_->time() / *plan_.scene.plot_interval + 1e-9) + 1;
+  }
+
+  StatisticsSink sink() {
+    return {[this](const SampleOut& out) { folder_.sample(out.monitor, out.step, out.time, out.value); },
+            [this](const BinOut& out) { folder_.bin(out.monitor, out.bin, out.step, out.mean, out.deviation); }};
+  }
+  void report_schema() {
+    std::vector<MonitorReport> reports;
+    for (std::size_t m = 0; m < monitors_->size(); ++m) {
+      const MonitorSetup& setup = monitors_->setup(m);
+      reports.push_back({setup.name, monitors_->unit(m), monitors_->meaning(m), monitors_->is_profile(m), monitors_->places(m),
+                         setup.averaging_start, setup.averaging_bin, setup.averaging_bins});
+    }
+    folder_.statistics_schema(reports);
+  }
+
+  double wall_seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count(); }
+
+  const Comm& comm_;
+  RunOptions options_;
+  RunPolicy policy_;
+  JobFolder folder_;
+  PhaseTimer timer_;
+  Plan plan_;
+  std::unique_ptr<Simulation> simulation_;
+  std::unique_ptr<Monitors> monitors_;
+  RunTotals totals_;
+  std::vector<std::string> checkpoint_faults_;
+  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+  double last_progress_ = 0, last_checkpoint_time_ = 0, last_checkpoint_wall_ = 0, settling_seconds_ = 0;
+  std::uint64_t last_checkpoint_step_ = 0;
+  std::int64_t next_plot_ = 0;
+};
+
+}  // namespace
+
+Reason run(const Comm& comm, const RunOptions& options) {
+  listen_to_signals();
+  return Run(comm, options).run();
+}
+
+}  // namespace bedflow

@@ -1,0 +1,245 @@
+#include "simulation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <utility>
+
+namespace bedflow {
+
+namespace {
+
+constexpr int steps_before_growth = 10;  // converged steps before a cut step size grows again
+
+std::string number(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.4g", value);
+  return text;
+}
+
+DemSetup dem_setup(const Plan& plan) {
+  const ParticleScene& particles = *plan.scene.particles;
+  DemSetup setup;
+  setup.radius = particles.diameter / 2;
+  setup.mass = particles.mass;
+  setup.gravity = plan.scene.gravity;
+  setup.skin = plan.skin;
+  setup.sides = plan.scene.sides;
+  setup.gas = plan.scene.coupling.has_value();
+  std::visit(
+      [&]<class Law>(const PairAndWall<Law>&) {
+        setup.rotation = Law::rotation;
+        setup.history = Law::history;
+      },
+      particles.tangential);
+  return setup;
+}
+
+// The owned particles at time 0, by where the case wants them.
+struct Seeder {
+  const Decomposition& decomposition;
+  double radius;
+  ParticleStore operator()(const RandomPlaces& places) const { return seed_random(decomposition, radius, places.seeds); }
+  ParticleStore operator()(const LatticePlaces& places) const {
+    return seed_lattice(decomposition, radius, places.count, places.low, places.high);
+  }
+  ParticleStore operator()(const PlacedSpheres& places) const { return seed_placed(decomposition, places); }
+};
+
+}  // namespace
+
+// ------------------------------------------------------------------------------------------------ parts
+
+Simulation::GasPart::GasPart(const Decomposition& decomposition, const Plan& plan, PhaseTimer& timer)
+    : grid(decomposition, plan.ghosts),
+      halo(decomposition, grid, timer),
+      state(grid),
+      solver(decomposition, grid, halo, plan.scene.gas->setup, timer) {}
+
+Simulation::CouplingPart::CouplingPart(const Decomposition& decomposition, const Plan& plan, GasPart& gas, PhaseTimer& timer)
+    : exchange(gas.grid),
+      transfer(decomposition, gas.grid, gas.halo, plan.scene.particles->mass / plan.scene.particles->density,
+               plan.scene.coupling->fraction_floor, timer),
+      fraction_before(gas.grid) {}
+
+Simulation::Simulation(const Plan& plan, const Comm& comm, PhaseTimer& timer)
+    : plan_(plan),
+      timer_(timer),
+      decomposition_(comm, plan.cells, plan.scene.size, plan.scene.periodic, plan.tall, plan.narrowest),
+      step_size_(plan.step) {
+  if (plan.scene.gas) gas_ = std::make_unique<GasPart>(decomposition_, plan_, timer_);
+  if (plan.scene.particles) dem_ = std::make_unique<Dem>(decomposition_, dem_setup(plan_), timer_);
+  if (plan.scene.coupling) coupling_ = std::make_unique<CouplingPart>(decomposition_, plan_, *gas_, timer_);
+  audit_exchange_ =
+      coupling_ && std::any_of(plan.scene.monitors.begin(), plan.scene.monitors.end(), [](const MonitorSetup& monitor) {
+        return std::holds_alternative<MomentumBalance>(monitor.statistic);
+      });
+}
+
+// ------------------------------------------------------------------------------------------------ one step
+
+void Simulation::step() {
+  double dt = std::min(step_size_, plan_.scene.end_time - time_);
+  if (coupling_) deposit_volume();                                                                 // particles -> ε, ∂ε/∂t
+  if (coupling_) deposit_drag();                                                                   // b and bV -> faces
+  if (gas_) dt = advance_gas(dt);                                                                  // U, p
+  if (coupling_) coupling_->transfer.sample(gas_->state, coupling_->exchange, dem_->particles());  // U, ∇p -> F_g
+  if (audit_exchange_) audit_exchange();
+  if (dem_) advance_particles(dt);  // contacts, walls, motion, in sub-steps
+  time_ += dt;
+  last_step_ = dt;
+  ++steps_;
+}
+
+void Simulation::deposit_volume() {
+  GasState& gas = gas_->state;
+  std::swap(coupling_->fraction_before, gas.fraction);
+  hidden_solids_ = coupling_->transfer.deposit_volume(dem_->particles(), gas.fraction);
+  if (!plan_.scene.coupling->displacement || last_step_ == 0) return;
+  const double rate = 1 / last_step_;  // the time in which the particles moved
+  for (std::size_t c = 0; c < gas.fraction.size(); ++c) {
+    gas.fraction_rate.data()[c] = rate * (gas.fraction.data()[c] - coupling_->fraction_before.data()[c]);
+  }
+}
+
+void Simulation::deposit_drag() {
+  const DragScene scene{plan_.scene.gas->setup.density, plan_.scene.gas->setup.viscosity, plan_.scene.particles->diameter};
+  std::visit(
+      [&](const auto& law) { coupling_->transfer.deposit_drag(law, scene, dem_->particles(), gas_->state, coupling_->exchange); },
+      plan_.scene.coupling->drag);
+}
+
+// Takes the longest step up to dt that converges; returns it.
+double Simulation::advance_gas(double dt) {
+  const Exchange* exchange = coupling_ ? &coupling_->exchange : nullptr;
+  for (;;) {
+    gas_outcome_ = gas_->solver.advance(gas_->state, exchange, time_, dt);
+    if (gas_outcome_.converged) break;
+    const double shorter = 0.9 * dt;
+    if (shorter < plan_.shortest_step) {
+      throw Stop(Reason::not_converged, "the gas does not converge at t = " + number(time_) + " s with dt = " + number(dt) +
+                                            " s, and 0.9 of it is below time.shortest_step = " + number(plan_.shortest_step) +
+                                            " s: " + gas_outcome_.reason);
+    }
+    notes_.push_back("step " + std::to_string(steps_ + 1) + ": dt cut from " + number(dt) + " to " + number(shorter) +
+                     " s: " + gas_outcome_.reason);
+    dt = step_size_ = shorter;
+    good_steps_ = 0;
+  }
+  if (step_size_ < plan_.step && ++good_steps_ >= steps_before_growth) {
+    step_size_ = std::min(plan_.step, step_size_ / 0.9);
+    good_steps_ = 0;
+    notes_.push_back("step " + std::to_string(steps_ + 1) + ": dt grows to " + number(step_size_) +
+                     " s: " + std::to_string(steps_before_growth) + " steps have converged");
+  }
+  return dt;
+}
+
+// What the gas lost less what the particles received, in the worst direction, over the sum of absolute values.
+void Simulation::audit_exchange() {
+  const ExchangeBalance balance = coupling_->transfer.balance(gas_->state, coupling_->exchange, dem_->particles());
+  exchange_residual_ = 0;
+  for (int d = 0; d < 3; ++d) {
+    if (balance.scale[d] == 0) continue;
+    const double residual = std::abs(balance.lost_by_gas[d] - balance.received_by_particles[d]) / balance.scale[d];
+    exchange_residual_ = std::max(exchange_residual_, residual);
+  }
+}
+
+void Simulation::advance_particles(double dt) {
+  const int substeps = std::max(1, static_cast<int>(std::ceil(dt / plan_.substep - 1e-9)));
+  std::visit([&](const auto& contact, const auto& tangential) { dem_->advance(substeps, dt / substeps, contact, tangential); },
+             plan_.scene.particles->contact, plan_.scene.particles->tangential);
+  substeps_ += static_cast<std::uint64_t>(substeps);
+  max_overlap_ = dem_->take_max_overlap();
+}
+
+bool Simulation::finished() const {
+  return time_ >= plan_.scene.end_time - 1e-9 * plan_.step;
+}
+
+const Failure& Simulation::failure() const {
+  static const Failure none;
+  return dem_ ? dem_->failure() : none;
+}
+
+std::vector<std::string> Simulation::take_notes() {
+  return std::exchange(notes_, {});
+}
+
+// ------------------------------------------------------------------------------------------------ begin
+
+void Simulation::seed() {
+  if (gas_) {
+    GasState& gas = gas_->state;
+    for (int d = 0; d < 3; ++d) gas.velocity[d].fill(plan_.scene.gas->initial_velocity[d]);
+    gas_->solver.prepare(gas, 0);
+  }
+  if (dem_) {
+    const ParticleScene& particles = *plan_.scene.particles;
+    ParticleStore seeds = std::visit(Seeder{decomposition_, particles.diameter / 2}, particles.places);
+    dem_->set_particles(std::move(seeds.position), std::move(seeds.velocity), std::move(seeds.spin), std::move(seeds.id));
+    particle_count_ = decomposition_.comm().sum(static_cast<std::int64_t>(dem_->particles().owned));
+  }
+  if (coupling_) hidden_solids_ = coupling_->transfer.deposit_volume(dem_->particles(), gas_->state.fraction);
+}
+
+bool Simulation::settle() {
+  const auto* random = dem_ ? std::get_if<RandomPlaces>(&plan_.scene.particles->places) : nullptr;
+  if (!random || !random->settling || particle_count_ == 0) return false;
+  const Settling& settling = *random->settling;
+  constexpr int substeps = 100;
+  std::visit([&](const auto& tangential) { dem_->advance(substeps, plan_.substep, settling.contact, tangential); },
+             plan_.scene.particles->tangential);
+  settled_time_ += substeps * plan_.substep;
+  dem_->take_max_overlap();
+  // Not before the highest has had the time to fall: at the start all are slow.
+  const double fall = std::sqrt(2 * random->seeds.high.y / norm(plan_.scene.gravity));
+  const double energy = decomposition_.comm().sum(dem_->kinetic_energy());
+  const double speed = std::sqrt(2 * energy / (static_cast<double>(particle_count_) * plan_.scene.particles->mass));
+  if (settled_time_ < settling.duration && (settled_time_ < fall || speed > settling.rest_velocity)) return true;
+  if (coupling_) hidden_solids_ = coupling_->transfer.deposit_volume(dem_->particles(), gas_->state.fraction);
+  return false;
+}
+
+// ------------------------------------------------------------------------------------------------ observe
+
+Observation Simulation::observation() {
+  Observation now{.decomposition = decomposition_};
+  if (gas_) {
+    now.grid = &gas_->grid;
+    now.pressure = &gas_->state.pressure;
+    now.fraction = &gas_->state.fraction;
+    const GasBalance balance = gas_->solver.balance();
+    const double through = std::max({std::abs(balance.in), std::abs(balance.out), std::abs(balance.storage)});
+    now.mass_residual = through > 0 ? (balance.in - balance.out - balance.storage) / through : 0;
+  }
+  now.momentum_residual = exchange_residual_;
+  if (dem_) {
+    now.particles = &dem_->particles();
+    now.radius = plan_.scene.particles->diameter / 2;
+    now.mass = plan_.scene.particles->mass;
+    now.rotation = dem_->setup().rotation;
+    now.max_overlap = max_overlap_;
+  }
+  return now;
+}
+
+Simulation::GasPlot Simulation::gas_plot() const {
+  const Grid& grid = gas_->grid;
+  const GasState& gas = gas_->state;
+  GasPlot plot{{grid.global, grid.first, grid.cells}, {}, {}, {}};
+  for (int k = 0; k < grid.cells[2]; ++k)
+    for (int j = 0; j < grid.cells[1]; ++j)
+      for (int i = 0; i < grid.cells[0]; ++i) {
+        plot.pressure.push_back(gas.pressure(i, j, k));
+        plot.fraction.push_back(gas.fraction(i, j, k));
+        for (int d = 0; d < 3; ++d) {
+          const double upper = gas.velocity[d](i + (d == 0), j + (d == 1), k + (d == 2));
+          plot.velocity.push_back(0.5 * (gas.velocity[d](i, j, k) + upper));
+        }
+      }
+  return plot;
+}
+
+}  // namespace bedflow

@@ -1,0 +1,100 @@
+// One coupled step, and the only std::visit over laws.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/phase_timer.h"
+#include "checkpoint/checkpoint.h"
+#include "coupling/transfer.h"
+#include "gas/simple.h"
+#include "particles/dem.h"
+#include "plan.h"
+
+namespace bedflow {
+
+class Simulation {
+ public:
+  Simulation(const Plan& plan, const Comm& comm, PhaseTimer& timer);
+
+  // The state at time 0: gas at rest or as the case says, particles at their places. Throws Stop(invalid_case).
+  void seed();
+  // Lets seeded particles fall for some sub-steps, without gas and with the settling's own restitution. False: they are at rest,
+  // or no settling was asked for, or its time is over.
+  bool settle();
+  double settled_time() const { return settled_time_; }  // s
+  // The state of a checkpoint, written on any number of ranks. Throws Stop(invalid_case) when it is of another scene.
+  void restore(const CheckpointReader& checkpoint);
+  CheckpointContent checkpoint() const;
+
+  // One step of at most step_size(). Throws Stop(not_converged) on all ranks alike.
+  void step();
+
+  const Decomposition& decomposition() const { return decomposition_; }
+  std::uint64_t steps() const { return steps_; }
+  double time() const { return time_; }  // s
+  bool finished() const;
+  double step_size() const { return step_size_; }                  // s, the controller's
+  double last_step() const { return last_step_; }                  // s, taken
+  std::uint64_t substeps() const { return substeps_; }             // of this process
+  std::int64_t particle_count() const { return particle_count_; }  // all ranks
+  const GasOutcome& gas_outcome() const { return gas_outcome_; }
+  const Failure& failure() const;         // of this rank, to be voted on
+  std::vector<std::string> take_notes();  // changes of the step size, for the event log
+
+  Observation observation();
+
+  // This rank's part of the gas at cell centres, for plot files.
+  struct GasPlot {
+    GridPart part;
+    std::vector<double> pressure, fraction, velocity;  // velocity: x, y, z a cell
+  };
+  GasPlot gas_plot() const;
+  const Dem* particles() const { return dem_.get(); }
+  const Grid* grid() const { return gas_ ? &gas_->grid : nullptr; }
+
+ private:
+  struct GasPart {
+    Grid grid;
+    Halo halo;
+    GasState state;
+    Simple solver;
+    GasPart(const Decomposition& decomposition, const Plan& plan, PhaseTimer& timer);
+  };
+  struct CouplingPart {
+    Exchange exchange;
+    Transfer transfer;
+    Field fraction_before;
+    CouplingPart(const Decomposition& decomposition, const Plan& plan, GasPart& gas, PhaseTimer& timer);
+  };
+
+  void deposit_volume();
+  void deposit_drag();
+  double advance_gas(double dt);
+  void advance_particles(double dt);
+  void audit_exchange();
+  void restore_gas(const CheckpointReader& from);
+  void restore_particles(const CheckpointReader& from);
+
+  Plan plan_;
+  PhaseTimer& timer_;
+  Decomposition decomposition_;
+  std::unique_ptr<GasPart> gas_;  // null: the scene has none of it
+  std::unique_ptr<Dem> dem_;
+  std::unique_ptr<CouplingPart> coupling_;
+
+  std::uint64_t steps_ = 0, substeps_ = 0;
+  double time_ = 0, step_size_ = 0, last_step_ = 0, settled_time_ = 0;
+  int good_steps_ = 0;        // since the step size changed
+  double hidden_solids_ = 0;  // m³ cut by the floor of ε in the last step
+  double max_overlap_ = 0;
+  bool audit_exchange_ = false;  // a monitor asks for it
+  double exchange_residual_ = 0;
+  std::int64_t particle_count_ = 0;
+  GasOutcome gas_outcome_;
+  std::vector<std::string> notes_;
+};
+
+}  // namespace bedflow

@@ -1,0 +1,200 @@
+// The simulation's state to and from a checkpoint.
+#include <array>
+#include <cmath>
+
+#include "particles/migration.h"
+#include "simulation.h"
+
+namespace bedflow {
+
+namespace {
+
+constexpr std::array<const char*, 3> velocity_names = {"gas/velocity_x", "gas/velocity_y", "gas/velocity_z"};
+
+// This rank's cells; for a face field of direction d the box's last face goes with the last block.
+GridPart part_of(const Grid& grid, int d = -1) {
+  GridPart part{grid.global, grid.first, grid.cells};
+  if (d >= 0) {
+    part.global[d] += 1;
+    if (grid.first[d] + grid.cells[d] == grid.global[d]) part.count[d] += 1;
+  }
+  return part;
+}
+
+template <class FieldType, class Take>
+void each(FieldType& field, const GridPart& part, Take take) {
+  for (int k = 0; k < part.count[2]; ++k)
+    for (int j = 0; j < part.count[1]; ++j)
+      for (int i = 0; i < part.count[0]; ++i) take(field(i, j, k));
+}
+
+CheckpointArray grid_array(const char* name, const char* unit, const char* meaning, const Field& field, const GridPart& part) {
+  std::vector<double> values;
+  each(field, part, [&](double value) { values.push_back(value); });
+  return {name, unit, meaning, std::move(values), part, 1};
+}
+
+void read_grid(const CheckpointReader& from, const char* name, Field& field, const GridPart& part) {
+  const std::vector<double> values = from.grid(name, part);
+  const double* next = values.data();
+  each(field, part, [&](double& value) { value = *next++; });
+}
+
+std::vector<double> flat(std::span<const Vec3> vectors) {
+  std::vector<double> values;
+  values.reserve(3 * vectors.size());
+  for (const Vec3& v : vectors) values.insert(values.end(), {v.x, v.y, v.z});
+  return values;
+}
+std::vector<Vec3> vectors(const std::vector<double>& values) {
+  std::vector<Vec3> result(values.size() / 3);
+  for (std::size_t i = 0; i < result.size(); ++i) result[i] = {values[3 * i], values[3 * i + 1], values[3 * i + 2]};
+  return result;
+}
+
+CheckpointArray rows(const char* name, const char* unit, const char* meaning, std::span<const Vec3> values) {
+  return {name, unit, meaning, flat(values), std::nullopt, 3};
+}
+
+}  // namespace
+
+CheckpointContent Simulation::checkpoint() const {
+  CheckpointContent content;
+  content.step = steps_;
+  content.time = time_;
+  const Vec3 size = plan_.scene.size;
+  content.numbers = {{"domain/size_x", size.x},
+                     {"domain/size_y", size.y},
+                     {"domain/size_z", size.z},
+                     {"cells/x", plan_.scene.cells[0]},
+                     {"cells/y", plan_.scene.cells[1]},
+                     {"cells/z", plan_.scene.cells[2]},
+                     {"controller/step_size", step_size_},
+                     {"controller/last_step", last_step_},
+                     {"controller/good_steps", good_steps_}};
+  if (gas_) {
+    const GasState& gas = gas_->state;
+    content.arrays.push_back(
+        grid_array("gas/pressure", "Pa", "gas pressure p at cell centres", gas.pressure, part_of(gas_->grid)));
+    content.arrays.push_back(grid_array("gas/fraction", "1", "gas fraction ε of the last deposit, at cell centres", gas.fraction,
+                                        part_of(gas_->grid)));
+    for (int d = 0; d < 3; ++d) {
+      content.arrays.push_back(grid_array(velocity_names[d], "m/s", "gas velocity at the faces of its direction", gas.velocity[d],
+                                          part_of(gas_->grid, d)));
+    }
+  }
+  if (dem_) {
+    const ParticleStore& store = dem_->particles();
+    const std::size_t n = store.owned;
+    content.numbers["particles/diameter"] = plan_.scene.particles->diameter;
+    content.numbers["particles/count"] = static_cast<double>(particle_count_);
+    content.numbers["particles/total_mass"] = static_cast<double>(particle_count_) * plan_.scene.particles->mass;
+    Vec3 momentum;
+    for (std::size_t p = 0; p < n; ++p) momentum += plan_.scene.particles->mass * store.velocity[p];
+    for (int d = 0; d < 3; ++d) {
+      content.numbers[std::string("particles/total_momentum_") + "xyz"[d]] = decomposition_.comm().sum(momentum[d]);
+    }
+    content.arrays.push_back(rows("particles/position", "m", "centres", std::span(store.position).first(n)));
+    content.arrays.push_back(rows("particles/velocity", "m/s", "velocities V", std::span(store.velocity).first(n)));
+    if (dem_->setup().rotation) {
+      content.arrays.push_back(rows("particles/spin", "rad/s", "angular velocities ω", std::span(store.spin).first(n)));
+    }
+    content.arrays.push_back({"particles/id", "", "identity, for life",
+                              std::vector<std::int64_t>(store.id.begin(), store.id.begin() + static_cast<std::ptrdiff_t>(n)),
+                              std::nullopt, 1});
+    content.arrays.push_back(rows("particles/position_at_rebuild", "m",
+                                  "centres when the pair list was last built, as the ranks hold them",
+                                  dem_->positions_at_rebuild()));
+    if (dem_->setup().history) {
+      std::vector<std::int64_t> pair_ids, wall_ids;
+      std::vector<Vec3> pair_displacements, wall_displacements;
+      for (const PairHistory& pair : dem_->pair_histories()) {
+        pair_ids.insert(pair_ids.end(), {pair.low, pair.high});
+        pair_displacements.push_back(pair.displacement);
+      }
+      for (const WallHistory& wall : dem_->wall_histories()) {
+        wall_ids.insert(wall_ids.end(), {wall.id, wall.wall});
+        wall_displacements.push_back(wall.displacement);
+      }
+      content.arrays.push_back(
+          {"contacts/pair", "", "ids of the two particles, lower first", std::move(pair_ids), std::nullopt, 2});
+      content.arrays.push_back(
+          rows("contacts/pair_displacement", "m", "tangential displacement ξ as the lower id sees it", pair_displacements));
+      content.arrays.push_back(
+          {"contacts/wall", "", "id of the particle, 2·direction + side of the wall", std::move(wall_ids), std::nullopt, 2});
+      content.arrays.push_back(
+          rows("contacts/wall_displacement", "m", "tangential displacement ξ as the particle sees it", wall_displacements));
+    }
+  }
+  return content;
+}
+
+void Simulation::restore(const CheckpointReader& from) {
+  const auto same = [&](const char* name, const char* field, double here) {
+    const double there = from.number(name);
+    if (std::abs(there - here) > 1e-12 * std::abs(here)) {
+      throw Stop(Reason::invalid_case, std::string("the checkpoint is of another scene: ") + field + " is " +
+                                           std::to_string(there) + " there and " + std::to_string(here) + " in the case");
+    }
+  };
+  for (int d = 0; d < 3; ++d) {
+    const std::string axis(1, "xyz"[d]);
+    same(("domain/size_" + axis).c_str(), ("domain.size." + axis).c_str(), plan_.scene.size[d]);
+    same(("cells/" + axis).c_str(), ("domain.cells." + axis).c_str(), plan_.scene.cells[d]);
+  }
+  if (from.has("gas/pressure") != static_cast<bool>(gas_) || from.has("particles/position") != static_cast<bool>(dem_)) {
+    throw Stop(Reason::invalid_case, "the checkpoint is of another scene: gas and particles must be there in both or in neither");
+  }
+  if (dem_) same("particles/diameter", "particles.diameter", plan_.scene.particles->diameter);
+  steps_ = from.step();
+  time_ = from.time();
+  step_size_ = std::min(plan_.step, from.number("controller/step_size"));
+  last_step_ = from.number("controller/last_step");
+  good_steps_ = static_cast<int>(from.number("controller/good_steps"));
+  if (gas_) restore_gas(from);
+  if (dem_) restore_particles(from);
+}
+
+void Simulation::restore_gas(const CheckpointReader& from) {
+  GasState& gas = gas_->state;
+  gas_->solver.prepare(gas, time_);
+  read_grid(from, "gas/pressure", gas.pressure, part_of(gas_->grid));
+  read_grid(from, "gas/fraction", gas.fraction, part_of(gas_->grid));
+  for (int d = 0; d < 3; ++d) read_grid(from, velocity_names[d], gas.velocity[d], part_of(gas_->grid, d));
+  gas_->halo.fill(gas.pressure);
+  gas_->halo.fill(gas.fraction);
+  gas_->halo.fill(gas.velocity);
+  if (coupling_) coupling_->transfer.mirror_at_faces(gas.fraction);
+}
+
+void Simulation::restore_particles(const CheckpointReader& from) {
+  const bool same_ranks = from.ranks() == decomposition_.comm().size();
+  ParticleStore store;
+  store.position = vectors(from.rows("particles/position"));
+  store.velocity = vectors(from.rows("particles/velocity"));
+  if (dem_->setup().rotation) {
+    store.spin = from.has("particles/spin") ? vectors(from.rows("particles/spin")) : std::vector<Vec3>(store.position.size());
+  }
+  store.id = from.integer_rows("particles/id");
+  store.owned = store.position.size();
+  std::vector<Vec3> at_rebuild;
+  if (same_ranks) at_rebuild = vectors(from.rows("particles/position_at_rebuild"));
+  if (!same_ranks) store = redistribute(decomposition_, store);
+
+  std::vector<PairHistory> pairs;
+  std::vector<WallHistory> walls;
+  if (dem_->setup().history && from.has("contacts/pair")) {
+    const std::vector<std::int64_t> pair_ids = from.integer_rows("contacts/pair"), wall_ids = from.integer_rows("contacts/wall");
+    const std::vector<Vec3> pair_displacements = vectors(from.rows("contacts/pair_displacement"));
+    const std::vector<Vec3> wall_displacements = vectors(from.rows("contacts/wall_displacement"));
+    for (std::size_t c = 0; c < pair_displacements.size(); ++c)
+      pairs.push_back({pair_ids[2 * c], pair_ids[2 * c + 1], pair_displacements[c]});
+    for (std::size_t c = 0; c < wall_displacements.size(); ++c) {
+      walls.push_back({wall_ids[2 * c], static_cast<int>(wall_ids[2 * c + 1]), wall_displacements[c]});
+    }
+  }
+  particle_count_ = decomposition_.comm().sum(static_cast<std::int64_t>(store.owned));
+  dem_->restore(std::move(store), std::move(at_rebuild), pairs, walls);
+}
+
+}  // namespace bedflow

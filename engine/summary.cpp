@@ -1,0 +1,105 @@
+#include "summary.h"
+
+#include <array>
+#include <cerrno>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <system_error>
+
+namespace bedflow {
+
+namespace {
+
+using nlohmann::json;
+
+// Seconds of each phase and of the whole, of this rank.
+std::array<double, phase_count + 1> seconds_of(const PhaseTimer& timer) {
+  std::array<double, phase_count + 1> seconds{};
+  for (int phase = 0; phase < phase_count; ++phase) seconds[phase] = timer[static_cast<Phase>(phase)].seconds;
+  seconds[phase_count] = timer.seconds();
+  return seconds;
+}
+
+bool is_gas(Phase phase) {
+  return phase == Phase::momentum || phase == Phase::pressure;
+}
+bool is_transfer(Phase phase) {
+  return phase == Phase::deposit || phase == Phase::sample || phase == Phase::halo;
+}
+bool is_dem(Phase phase) {
+  return phase == Phase::pairs || phase == Phase::contacts || phase == Phase::walls || phase == Phase::integration ||
+         phase == Phase::migration;
+}
+
+// What a phase's work is counted in: the particles' phases per particle and sub-step, the others per cell and step.
+const char* unit_of(Phase phase) {
+  if (is_dem(phase)) return "particle and sub-step";
+  if (phase == Phase::deposit || phase == Phase::sample) return "particle and step";
+  return "cell and step";
+}
+
+json phase_entry(const char* unit, double seconds, double units) {
+  json entry = {{"seconds", seconds}, {"per", unit}};
+  if (units > 0) entry["nanoseconds_per_unit"] = seconds * 1e9 / units;
+  return entry;
+}
+
+}  // namespace
+
+void write_summary(const Comm& comm, const std::filesystem::path& path, const Plan& plan, const PhaseTimer& timer,
+                   const RunTotals& totals) {
+  const auto mine = seconds_of(timer);
+  const std::vector<double> all = comm.gather_all(mine);
+  if (!comm.root()) return;
+
+  const auto particle_substeps = static_cast<double>(totals.particle_substeps),
+             cell_steps = static_cast<double>(totals.cell_steps);
+  const double particle_steps = static_cast<double>(plan.particle_count) * static_cast<double>(totals.steps);
+  double gas = 0, transfer = 0, dem = 0, busy = 0;
+  json phases, ranks = json::array();
+  for (int rank = 0; rank < comm.size(); ++rank) ranks.push_back({{"wall_seconds", all[rank * mine.size() + phase_count]}});
+  for (int p = 0; p < phase_count; ++p) {
+    const Phase phase = static_cast<Phase>(p);
+    double seconds = 0;  // CPU seconds, all ranks
+    for (int rank = 0; rank < comm.size(); ++rank) {
+      const double share = all[rank * mine.size() + p];
+      seconds += share;
+      ranks[rank]["seconds"][std::string(phase_names[p])] = share;
+    }
+    const double units = is_dem(phase) ? particle_substeps : unit_of(phase)[0] == 'p' ? particle_steps : cell_steps;
+    phases[std::string(phase_names[p])] = phase_entry(unit_of(phase), seconds, units);
+    gas += is_gas(phase) ? seconds : 0;
+    transfer += is_transfer(phase) ? seconds : 0;
+    dem += is_dem(phase) ? seconds : 0;
+    busy += phase == Phase::other || phase == Phase::checkpoint || phase == Phase::output ? 0 : seconds;
+  }
+  json summary = {{"case", plan.scene.name},
+                  {"exit_code", static_cast<int>(totals.reason)},
+                  {"ranks", comm.size()},
+                  {"wall_seconds", timer.seconds()},
+                  {"settling_seconds", totals.settling_seconds},
+                  {"simulated_seconds", totals.simulated_seconds},
+                  {"steps", totals.steps},
+                  {"substeps", totals.substeps},
+                  {"particles", plan.particle_count},
+                  {"cells", plan.cell_count},
+                  {"list_rebuilds", totals.list_rebuilds},
+                  {"gas_iterations", totals.gas_iterations},
+                  {"pressure_iterations", totals.pressure_iterations},
+                  {"phases", phases},
+                  {"per_rank", ranks}};
+  if (particle_substeps > 0) summary["particle_substep_microseconds"] = dem * 1e6 / particle_substeps;
+  if (cell_steps > 0) summary["gas_cell_step_microseconds"] = gas * 1e6 / cell_steps;
+  if (busy > 0) summary["gas_share"] = gas / busy;
+  if (busy > 0) summary["transfer_share"] = transfer / busy;
+  if (totals.simulated_seconds > 0) summary["cpu_seconds_per_simulated_second"] = busy / totals.simulated_seconds;
+
+  const std::filesystem::path partial = path.string() + ".partial";
+  std::ofstream file(partial);
+  file << summary.dump(2) << "\n";
+  file.close();
+  if (!file) throw std::system_error(errno, std::generic_category(), partial.string());
+  std::filesystem::rename(partial, path);
+}
+
+}  // namespace bedflow

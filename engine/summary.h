@@ -1,0 +1,29 @@
+// summary.json: what a run cost.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+
+#include "base/phase_timer.h"
+#include "base/stop.h"
+#include "parallel/comm.h"
+#include "plan.h"
+
+namespace bedflow {
+
+struct RunTotals {
+  Reason reason = Reason::finished;
+  std::uint64_t steps = 0, substeps = 0;  // of this attempt
+  double simulated_seconds = 0;           // of this attempt
+  double settling_seconds = 0;            // wall, before the steps
+  std::uint64_t particle_substeps = 0;    // all ranks
+  std::uint64_t cell_steps = 0;           // all ranks
+  std::uint64_t list_rebuilds = 0, gas_iterations = 0, pressure_iterations = 0;
+};
+
+// Collective; rank 0 writes. Wall seconds, steps, sub-steps, and seconds and nanoseconds per unit of work of every phase, per
+// rank and in total (the ranks' mean). Throws std::system_error on rank 0.
+void write_summary(const Comm& comm, const std::filesystem::path& path, const Plan& plan, const PhaseTimer& timer,
+                   const RunTotals& totals);
+
+}  // namespace bedflow
