@@ -6,5 +6,5 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 preset=${1:-release}
 shift $(($# > 0))
-cmake --preset "$preset" -Wno-dev >"/dev/null"
+cmake --preset "$preset" -Wno-dev >/dev/null
 cmake --build --preset "$preset" ${1:+--target "$@"}
