@@ -3,6 +3,7 @@
 
 #include <new>
 #include <string>
+#include <system_error>
 
 #include "base/stop.h"
 #include "parallel/comm.h"
@@ -28,6 +29,9 @@ void do_alike(const Comm& comm, Work work) {
     failure.note(stop.reason, stop.what());
   } catch (const std::bad_alloc&) {
     failure.note(Reason::out_of_memory, "out of memory while reading or writing a file");
+  } catch (const std::system_error& error) {
+    const bool full = error.code() == std::errc::no_space_on_device;
+    failure.note(full ? Reason::disk_full : Reason::internal, error.what());
   } catch (const std::exception& error) {
     failure.note(Reason::internal, error.what());
   }

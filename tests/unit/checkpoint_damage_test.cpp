@@ -7,6 +7,7 @@
 #include <fstream>
 #include <random>
 
+#include "checkpoint/posix_file.h"
 #include "unit/checkpoint_test_case.h"
 
 namespace bedflow {
@@ -164,6 +165,17 @@ TEST(FullDisk, StopsEveryRankAndKeepsTheOlderCheckpoint) {
   if (!comm.any(mounted)) GTEST_SKIP() << "a small file system cannot be mounted here (that takes root)";
   write_checkpoint(comm, folder.checkpoints(), content_of(comm, 1), 2);
   expect_disk_full(comm, folder.checkpoints());
+  comm.barrier();
+  if (comm.root()) {  // and where the free space shrinks between the look at it and the reservation
+    const fs::path path = folder.checkpoints() / "reserved";
+    write_file(path, "");
+    try {
+      PosixFile(path, PosixFile::Mode::write).reserve(2 << 20);
+      ADD_FAILURE() << "2 MiB were reserved on a file system of 1 MiB";
+    } catch (const Stop& stop) {
+      EXPECT_EQ(stop.reason, Reason::disk_full) << stop.what();
+    }
+  }
   comm.barrier();
   if (comm.root()) ::umount(folder.checkpoints().c_str());
 }
