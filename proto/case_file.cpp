@@ -1,0 +1,85 @@
+#include "case_file.h"
+
+#include <google/protobuf/text_format.h>
+#include <google/protobuf/util/json_util.h>
+
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <sstream>
+#include <stdexcept>
+
+#include "case_parser.h"
+#include "case_rules.h"
+#include "case_walker.h"
+
+namespace bedflow {
+namespace {
+
+constexpr std::size_t kMostFaults = 200;  // a list beyond that helps nobody, and must fit into a status
+
+void shorten(std::vector<CaseFault>& faults) {
+  if (faults.size() <= kMostFaults) return;
+  const std::size_t more = faults.size() - kMostFaults;
+  faults.resize(kMostFaults);
+  faults.push_back({"case", "has " + std::to_string(more) + " more faults: correct these first"});
+}
+
+bool is_json(const std::string& text) {
+  const std::size_t first = text.find_first_not_of(" \t\r\n");
+  return first != std::string::npos && text[first] == '{';
+}
+
+}  // namespace
+
+CaseRead read_case(const std::string& text) {
+  CaseParse parse = is_json(text) ? parse_case_json(text) : parse_case_text(text);
+  CaseRead result{std::move(parse.value), std::move(parse.faults)};
+  if (parse.read_to_end) {
+    for (CaseFault& fault : check_case(result.value)) result.faults.push_back(std::move(fault));
+  }
+  shorten(result.faults);
+  return result;
+}
+
+CaseRead read_case_file(const std::filesystem::path& path) {
+  errno = 0;
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream text;
+  if (file && !std::filesystem::is_directory(path)) text << file.rdbuf();
+  if (!file || std::filesystem::is_directory(path)) {
+    const std::string why = std::filesystem::is_directory(path) ? "is a folder" : std::strerror(errno);
+    return {{}, {{path.string(), "cannot be read: " + why + "; give the path of a case file ('bedflow init' writes one)"}}};
+  }
+  return read_case(text.str());
+}
+
+std::vector<CaseFault> check_case(const v1::Case& value) {
+  std::vector<CaseFault> faults = walk_case(value);
+  check_scene(value, faults);
+  check_faces(value, faults);
+  check_particles(value, faults);
+  check_monitors(value, faults);
+  shorten(faults);
+  return faults;
+}
+
+std::string case_text(const v1::Case& value) {
+  google::protobuf::TextFormat::Printer printer;
+  printer.SetUseUtf8StringEscaping(true);
+  std::string text;
+  printer.PrintToString(value, &text);
+  return text;
+}
+
+std::string case_json(const v1::Case& value) {
+  google::protobuf::util::JsonPrintOptions options;
+  options.add_whitespace = true;
+  options.preserve_proto_field_names = true;
+  std::string text;
+  const auto status = google::protobuf::util::MessageToJsonString(value, &text, options);
+  if (!status.ok()) throw std::invalid_argument("the case has no JSON: " + status.ToString());
+  return text;
+}
+
+}  // namespace bedflow

@@ -1,0 +1,89 @@
+#include "case_rules.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "parameter_text.h"
+
+namespace bedflow {
+namespace {
+
+void check_parts(const v1::Case& value, CaseFaults& faults) {
+  if (!value.has_gas() && !value.has_particles()) {
+    faults.push_back({"gas", "is missing, and so is particles: a scene needs at least one of them"});
+  }
+  if (value.has_gas() && value.has_particles() && !value.has_coupling()) {
+    faults.push_back({"coupling", "is missing: gas and particles are both there; set drag, kernel and exchange in coupling"});
+  }
+  if (value.has_coupling() && !(value.has_gas() && value.has_particles())) {
+    const std::string absent = value.has_gas() ? "particles" : (value.has_particles() ? "gas" : "gas and particles");
+    faults.push_back({"coupling", "needs gas and particles, but the case has no " + absent + ": remove coupling or add them"});
+  }
+  if (value.has_gas() && value.has_domain() && !value.domain().has_cells()) {
+    faults.push_back({"domain.cells", "is missing: the gas (gas) needs a grid; set the cells in each direction"});
+  }
+}
+
+void check_time(const v1::Case& value, CaseFaults& faults) {
+  const v1::Time& time = value.time();
+  if (!value.has_time()) return;
+  if (!time.has_step() && !value.has_particles()) {
+    faults.push_back(
+        {"time.step", "is missing: without particles there is no collision time to take it from; set the gas step in s"});
+  }
+  if (time.has_step() && time.has_shortest_step() && time.shortest_step() > time.step()) {
+    faults.push_back({"time.shortest_step", "is " + number_text(time.shortest_step()) + " s, longer than time.step, " +
+                                                number_text(time.step()) + " s: make it shorter"});
+  }
+}
+
+// The hat spreads a particle over the cells whose centres are nearest; within a smaller cell ε could fall to 0.
+void check_cells_against_diameter(const v1::Case& value, CaseFaults& faults) {
+  if (!value.has_gas() || !value.has_particles() || !value.coupling().has_hat() || !value.domain().has_cells()) return;
+  const double diameter = value.particles().diameter();
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double length = component(value.domain().size(), axis);
+    const double edge = length / component(value.domain().cells(), axis);
+    if (!(edge < diameter * (1 - 1e-9)) || !(length > 0)) continue;
+    const std::string most = length >= diameter
+                                 ? "use at most " + number_text(std::floor(length / diameter * (1 + 1e-9))) + " cells"
+                                 : "make domain.size." + std::string(kAxes[axis]) + " larger";
+    faults.push_back({"domain.cells." + std::string(kAxes[axis]),
+                      "makes cells of " + number_text(edge) + " m, smaller than particles.diameter, " + number_text(diameter) +
+                          " m: the kernel coupling.hat needs cells of at least one diameter; " + most});
+  }
+}
+
+void check_viscosity(const v1::Case& value, CaseFaults& faults) {
+  const v1::Coupling& coupling = value.coupling();
+  if (!value.has_gas() || !value.has_particles() || !value.gas().has_viscosity() || value.gas().viscosity() != 0) return;
+  if (coupling.drag_case() == v1::Coupling::DRAG_NOT_SET || coupling.has_constant_drag()) return;
+  faults.push_back({"gas.viscosity", "is 0 Pa·s, but the law chosen in coupling.drag divides by it: set it above 0"});
+}
+
+}  // namespace
+
+void check_scene(const v1::Case& value, CaseFaults& faults) {
+  check_parts(value, faults);
+  check_time(value, faults);
+  check_cells_against_diameter(value, faults);
+  check_viscosity(value, faults);
+}
+
+void check_extent(const v1::Case& value, const v1::Vector& low, const v1::Vector& high, std::size_t axis, const std::string& path,
+                  CaseFaults& faults) {
+  const double from = component(low, axis);
+  const double to = component(high, axis);
+  const double size = component(value.domain().size(), axis);
+  const std::string name = kAxes[axis];
+  if (from >= to) {
+    faults.push_back({path + ".high." + name,
+                      "is " + number_text(to) + " m, not above " + path + ".low." + name + ", " + number_text(from) + " m"});
+  }
+  if (to > size * (1 + 1e-12)) {
+    faults.push_back({path + ".high." + name, "is " + number_text(to) + " m, outside the domain: at most domain.size." + name +
+                                                  ", " + number_text(size) + " m"});
+  }
+}
+
+}  // namespace bedflow

@@ -1,0 +1,33 @@
+// The rules that join fields. Each names both; all are kept quiet by values that are absent or not finite, since the walker
+// has reported those.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "case_file.h"
+
+namespace bedflow {
+
+using CaseFaults = std::vector<CaseFault>;
+
+void check_scene(const v1::Case& value, CaseFaults& faults);      // what must be there together; time; grid and kernel
+void check_faces(const v1::Case& value, CaseFaults& faults);      // periodic directions, walls, patches, balance of flows
+void check_particles(const v1::Case& value, CaseFaults& faults);  // where they are at time 0, contacts' reach
+void check_monitors(const v1::Case& value, CaseFaults& faults);   // monitors and the references that belong to them
+
+constexpr std::array<const char*, 3> kAxes{"x", "y", "z"};
+
+// Components by axis, 0 to 2, of Vector, Lengths, Cells and Directions.
+template <typename Components>
+auto component(const Components& value, std::size_t axis) {
+  return axis == 0 ? value.x() : (axis == 1 ? value.y() : value.z());
+}
+
+// Reports where [low, high] along an axis is empty or reaches beyond the domain. `path` is that of the message with the
+// corners low and high.
+void check_extent(const v1::Case& value, const v1::Vector& low, const v1::Vector& high, std::size_t axis, const std::string& path,
+                  CaseFaults& faults);
+
+}  // namespace bedflow
