@@ -183,13 +183,14 @@ TEST(Monitors, AStatisticOfAnAbsentPartHasNoValues) {
 
 // Steps of 0.1 s whose time is summed, so that it carries round-off.
 template <class Each>
-void walk(Monitors& monitors, Observation now, int from, int to, Each each) {
+void walk(Monitors& monitors, Observation now, int from, int to, Each each, int last = 0) {
   double time = 0;
   for (int step = 1; step <= to; ++step) {
     time += 0.1;
     if (step <= from) continue;
     now.mass_residual = each(time);
-    monitors.observe(now, static_cast<std::uint64_t>(step), time, 0.1, step == to);
+    now.max_overlap = step % 4 == 1 ? 0.5 : 0.01;  // its peaks fall between samples
+    monitors.observe(now, static_cast<std::uint64_t>(step), time, 0.1, step == last);
   }
 }
 double same(double time) {
@@ -201,7 +202,7 @@ TEST(Monitors, SamplesAreTakenAtMultiplesOfTheIntervalInSpiteOfRoundOff) {
   Results results;
   Monitors monitors(box.decomposition, {{.name = "m", .statistic = MassBalance{}, .interval = 0.3}}, results.sink());
   monitors.observe(box.observation(), 0, 0, 0);
-  walk(monitors, box.observation(), 0, 100, same);
+  walk(monitors, box.observation(), 0, 100, same, 100);
   std::vector<std::uint64_t> steps, expected;
   for (const auto& sample : results.samples[0]) steps.push_back(sample.step);
   for (std::uint64_t k = 0; k <= 99; k += 3) expected.push_back(k);
@@ -303,24 +304,18 @@ TEST(Monitors, ResumedInTheMiddleOfABinTheyGoOnWithTheSameBits) {
                                          averaged(VelocityProfile{.height = 0.4, .half_height = 0.1, .bins = 3}, 0, 1.3, 4),
                                          {.name = "c", .statistic = MaxOverlap{}, .interval = 0.4}};
   const auto signal = [](double time) { return std::sin(7 * time) / 3; };
-  Observation now = box.observation();
-  now.max_overlap = 0.01;
+  const Observation now = box.observation();
   Results through;
   Monitors whole(box.decomposition, setups, through.sink());
-  walk(whole, now, 0, 60, signal);
+  walk(whole, now, 0, 60, signal, 60);
   for (const int cut : {1, 7, 31, 52}) {
     Results a, b;
     Monitors until(box.decomposition, setups, a.sink());
-    double time = 0;
-    for (int step = 1; step <= cut; ++step) {
-      time += 0.1;
-      now.mass_residual = signal(time);
-      until.observe(now, static_cast<std::uint64_t>(step), time, 0.1);
-    }
+    walk(until, now, 0, cut, signal);
     Monitors after(box.decomposition, setups, b.sink());
     after.restore(until.state());
     EXPECT_EQ(after.state(), until.state());
-    walk(after, now, cut, 60, signal);
+    walk(after, now, cut, 60, signal, 60);
     EXPECT_EQ(after.state(), whole.state());
     for (std::size_t m = 0; m < setups.size(); ++m) {
       std::vector<double> joined, expected;
