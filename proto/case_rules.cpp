@@ -37,21 +37,29 @@ void check_time(const v1::Case& value, CaseFaults& faults) {
   }
 }
 
-// The hat spreads a particle over the cells whose centres are nearest; within a smaller cell ε could fall to 0.
+// The hat reaches one cell to either side. Its base, two cells, must not be narrower than the particle; and a cell must hold
+// one particle's worth of volume with room to spare, Δ* = ∛(dx dy dz)/d ≥ 1, or ε falls to 0 in it.
 void check_cells_against_diameter(const v1::Case& value, CaseFaults& faults) {
   if (!value.has_gas() || !value.has_particles() || !value.coupling().has_hat() || !value.domain().has_cells()) return;
   const double diameter = value.particles().diameter();
+  const std::string d = "particles.diameter, " + number_text(diameter) + " m";
+  double volume = 1;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const double length = component(value.domain().size(), axis);
     const double edge = length / component(value.domain().cells(), axis);
-    if (!(edge < diameter * (1 - 1e-9)) || !(length > 0)) continue;
-    const std::string most = length >= diameter
-                                 ? "use at most " + number_text(std::floor(length / diameter * (1 + 1e-9))) + " cells"
-                                 : "make domain.size." + std::string(kAxes[axis]) + " larger";
-    faults.push_back({"domain.cells." + std::string(kAxes[axis]),
-                      "makes cells of " + number_text(edge) + " m, smaller than particles.diameter, " + number_text(diameter) +
-                          " m: the kernel coupling.hat needs cells of at least one diameter; " + most});
+    volume *= edge;
+    if (!(length > 0) || !(edge < diameter / 2)) continue;
+    const double most = std::floor(2 * length / diameter);
+    faults.push_back(
+        {"domain.cells." + std::string(kAxes[axis]),
+         "makes cells of " + number_text(edge) + " m, but the kernel coupling.hat needs at least half of " + d + "; " +
+             (most >= 1 ? "use at most " + number_text(most) : "make domain.size." + std::string(kAxes[axis]) + " larger")});
   }
+  const double ratio = std::cbrt(volume) / diameter;
+  if (!(volume > 0) || !(ratio < 1)) return;
+  faults.push_back({"domain.cells", "makes cells of " + number_text(std::round(ratio * 1e3) / 1e3) +
+                                        " diameters (cube root of their volume over " + d +
+                                        "): the kernel coupling.hat needs at least 1; use fewer cells"});
 }
 
 void check_viscosity(const v1::Case& value, CaseFaults& faults) {
