@@ -1,0 +1,248 @@
+// Mass in every cell, displacement by moving solids, drag, and what happens when a step cannot be taken.
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <numbers>
+
+#include "gas_box.h"
+
+namespace bedflow {
+namespace {
+
+// Upright channel: inflow below, outflow above, walls beside.
+GasSetup upright(double inflow) {
+  GasSetup setup = still_air();
+  setup.gravity = {0, -9.81, 0};
+  setup.faces[0] = {NoSlip{}, NoSlip{}};
+  setup.faces[1] = {Inflow{{inflow, 0, 0}, {}}, Outflow{0}};
+  return setup;
+}
+
+void set_fraction(GasBox& box, const std::function<double(double, double, double)>& epsilon) {
+  box.for_cells(
+      [&](int i, int j, int k) { box.state.fraction(i, j, k) = epsilon(box.centre(0, i), box.centre(1, j), box.centre(2, k)); });
+}
+
+void for_solved(const GasBox& box, int d, const std::function<void(int, int, int)>& act) {
+  const Simple::Range range = box.simple.solved_faces(d);
+  Int3 low{0, 0, 0}, high = box.grid.cells;
+  low[d] = range.low;
+  high[d] = range.high + 1;
+  for (int k = low[2]; k < high[2]; ++k)
+    for (int j = low[1]; j < high[1]; ++j)
+      for (int i = low[0]; i < high[0]; ++i) act(i, j, k);
+}
+
+// A bed of given drag density (kg/m³s) and solids fraction in the whole box, the same on every control volume; moving at `speed`.
+void fill_exchange(GasBox& box, double drag, double solids, Vec3 speed = {}) {
+  for (int d = 0; d < 3; ++d)
+    for_solved(box, d, [&, d](int i, int j, int k) {
+      const int at[3] = {i, j, k};
+      const bool half = at[d] == box.grid.cells[d] && box.simple.solved_faces(d).high == at[d];
+      box.exchange.drag[d](i, j, k) = drag * box.grid.cell_volume() * (half ? 0.5 : 1);
+      box.exchange.drag_momentum[d](i, j, k) = box.exchange.drag[d](i, j, k) * speed[d];
+      box.exchange.buoyancy[d](i, j, k) = solids;
+    });
+}
+
+TEST(GasMass, IsConservedInEveryCellToTheTolerance) {
+  GasSetup setup = upright(0.5);
+  setup.tolerance = 1e-6;
+  GasBox box({10, 24, 4}, {0.05, 0.12, 0.02}, {false, false, false}, setup, Comm::self(), 1);
+  set_fraction(
+      box, [](double x, double y, double z) { return 0.7 + 0.25 * std::sin(200 * x) * std::cos(150 * y) * std::sin(90 * z); });
+  box.for_cells([&](int i, int j, int k) { box.state.fraction_rate(i, j, k) = std::sin(0.7 * i + j) * std::cos(0.3 * k); });
+  fill_exchange(box, 500, 0.3);
+  for (int n = 0; n < 5; ++n) ASSERT_TRUE(box.step(1e-4, true).converged);
+  const double throughput = 0.5 * 0.05 * 0.02;
+  double sum = 0;
+  box.for_cells([&](int i, int j, int k) { sum += std::abs(box.imbalance(i, j, k)); });
+  EXPECT_LT(sum, 3 * setup.tolerance * throughput);  // 3: the solver's throughput counts three directions and storage
+  const GasBalance balance = box.simple.balance();
+  EXPECT_NEAR(balance.in, throughput, 1e-12 * throughput);  // given, to round-off
+  EXPECT_NEAR(balance.in, balance.out + balance.storage, 3 * setup.tolerance * throughput);
+}
+
+// ∂ε/∂t the same everywhere: over a floor the superficial velocity at height y is −y ∂ε/∂t.
+TEST(Displacement, UniformRateInAnOpenBoxGivesTheVelocityOfTheVolumeBalance) {
+  GasSetup setup = still_air();
+  setup.faces[1][1] = Outflow{0};
+  setup.tolerance = 1e-9;
+  GasBox box({3, 16, 2}, {0.03, 0.16, 0.02}, {false, false, true}, setup);
+  const double rate = -2, epsilon = 0.5;
+  set_fraction(box, [=](double, double, double) { return epsilon; });
+  box.for_cells([&](int i, int j, int k) { box.state.fraction_rate(i, j, k) = rate; });
+  for (int n = 0; n < 3; ++n) ASSERT_TRUE(box.step(1e-3).converged);
+  for_solved(box, 1, [&](int i, int j, int k) {
+    EXPECT_NEAR(epsilon * box.state.velocity[1](i, j, k), -rate * 0.01 * j, 1e-9 * 0.32);  // tolerance times the highest
+  });
+}
+
+// A frozen cloud that swings to and fro in a closed box pushes the gas the other way: ε u = −∫ ∂ε/∂t dx.
+TEST(Displacement, SwingingCloudInAClosedBoxMovesTheGasByTheVolumeBalance) {
+  GasSetup setup = still_air();
+  setup.tolerance = 1e-9;
+  const int n = 32;
+  const double length = 0.32, dt = 1e-3, amplitude = 0.02, pi = std::numbers::pi;
+  GasBox box({n, 2, 2}, {length, 0.02, 0.02}, {false, true, true}, setup);
+  // Gas left of x: the cloud is one wave of ε that slides.
+  const auto volume = [&](double x, double t) {
+    const double shift = amplitude * std::sin(20 * t);
+    return 0.7 * x + 0.2 * length / (2 * pi) * std::sin(2 * pi * x / length) * (1 + shift / length * 10);
+  };
+  for (int step = 0; step < 10; ++step) {
+    const auto mean = [&](int i, double t) { return (volume((i + 1) * 0.01, t) - volume(i * 0.01, t)) / 0.01; };
+    const double now = box.time + dt;
+    box.for_cells([&](int i, int j, int k) {
+      box.state.fraction(i, j, k) = mean(i, now);
+      box.state.fraction_rate(i, j, k) = (mean(i, now) - mean(i, now - dt)) / dt;
+    });
+    const GasOutcome outcome = box.step(dt);
+    ASSERT_TRUE(outcome.converged) << outcome.reason;
+    double fastest = 0;
+    for (int i = 1; i < n; ++i) fastest = std::max(fastest, std::abs(volume(i * 0.01, now) - volume(i * 0.01, now - dt)) / dt);
+    for (int i = 1; i < n; ++i) {
+      const double epsilon = 0.5 * (box.state.fraction(i - 1, 0, 0) + box.state.fraction(i, 0, 0));
+      const double exact = -(volume(i * 0.01, now) - volume(i * 0.01, now - dt)) / dt;
+      EXPECT_NEAR(epsilon * box.state.velocity[0](i, 0, 0), exact, 1e-7 * fastest);  // tolerance summed over the cells
+    }
+  }
+}
+
+TEST(Drag, FixedBedInAChannelHasThePressureDropOfTheClosedForm) {
+  // ε_b A Δp = Σ b u over a control volume, ε_b = ε: Δp/h = (drag density) u / ε, u = U/ε.
+  const double superficial = 0.5, epsilon = 0.4, drag = 3000;
+  GasSetup setup = upright(superficial);
+  setup.faces[0] = {FreeSlip{}, FreeSlip{}};
+  setup.tolerance = 1e-9;
+  GasBox box({4, 20, 2}, {0.02, 0.1, 0.01}, {false, false, false}, setup);
+  set_fraction(box, [=](double, double, double) { return epsilon; });
+  fill_exchange(box, drag, 1 - epsilon);
+  ASSERT_TRUE(box.settle(1e-3, 1e-11, 50, true));
+  const double gradient = drag * superficial / epsilon / epsilon + setup.density * 9.81;
+  for (int j = 1; j < 20; ++j) {
+    const double drop = box.state.pressure(1, j - 1, 0) - box.state.pressure(1, j, 0);
+    EXPECT_NEAR(drop / (gradient * 0.005), 1, 1e-7);  // exact for a uniform bed, up to the tolerance
+  }
+  EXPECT_NEAR(box.state.pressure(1, 19, 0) / (gradient * 0.0025), 1, 1e-7);  // half a cell below the outflow
+}
+
+TEST(Drag, UpToAMillionTimesInertiaConvergesInFewIterations) {
+  const double dt = 1e-4;
+  for (const double ratio : {0.0, 1.0, 1e3, 1e6}) {
+    GasSetup setup = upright(0.5);
+    GasBox box({9, 24, 4}, {0.045, 0.12, 0.02}, {false, false, false}, setup, Comm::self(), 1);
+    // Solids below 60 mm only: the coefficients jump by `ratio`.
+    set_fraction(box, [](double, double y, double) { return y < 0.06 ? 0.45 : 1.0; });
+    fill_exchange(box, 0, 0);
+    for (int d = 0; d < 3; ++d)
+      for_solved(box, d, [&, d](int i, int j, int k) {
+        if (j > 12) return;
+        box.exchange.drag[d](i, j, k) = ratio * setup.density * 0.45 * box.grid.cell_volume() / dt;
+        box.exchange.buoyancy[d](i, j, k) = 0.55;
+      });
+    for (int n = 0; n < 4; ++n) {
+      const GasOutcome outcome = box.step(dt, true);
+      ASSERT_TRUE(outcome.converged) << ratio << ": " << outcome.reason;
+      // Each iteration leaves 1/5 of the pressure's error; the impulsive start's own pressure (ρ L U/Δt, 500 times the rest)
+      // comes in the first step and goes in the second.
+      EXPECT_LE(outcome.iterations, n < 2 ? 10 : 4) << ratio << " step " << n;
+    }
+  }
+}
+
+TEST(Drag, GasFollowsParticlesThatDragIt) {
+  // Periodic box, particles moving at V: u = V (1 − (1 + β dt/ρε)^−n), the implicit scheme's own exact answer.
+  GasSetup setup = still_air();
+  setup.tolerance = 1e-12;
+  GasBox box({4, 4, 4}, {0.04, 0.04, 0.04}, {true, true, true}, setup);
+  const double epsilon = 0.6, drag = 50, dt = 1e-3;
+  set_fraction(box, [=](double, double, double) { return epsilon; });
+  fill_exchange(box, drag, 1 - epsilon, {0.3, -0.2, 0.1});
+  for (int n = 1; n <= 5; ++n) {
+    ASSERT_TRUE(box.step(dt, true).converged);
+    const double share = 1 - std::pow(1 + drag * dt / (setup.density * epsilon), -n);
+    EXPECT_NEAR(box.state.velocity[0](1, 2, 3), 0.3 * share, 1e-11);  // tolerance
+    EXPECT_NEAR(box.state.velocity[1](1, 2, 3), -0.2 * share, 1e-11);
+    EXPECT_NEAR(box.state.velocity[2](1, 2, 3), 0.1 * share, 1e-11);
+  }
+}
+
+TEST(Inflow, PatchAcrossCellsBringsExactlyItsFlow) {
+  GasSetup setup = upright(0.2);
+  const Inflow::Patch patch{{0.0131, 0, 0.0043}, {0.0277, 0, 0.0159}, {5, 1, 0.5}};
+  std::get<Inflow>(setup.faces[1][0]).patches = {patch};
+  GasBox box({10, 12, 4}, {0.05, 0.06, 0.02}, {false, false, false}, setup);
+  set_fraction(box, [](double x, double, double) { return 0.5 + 5 * x; });
+  ASSERT_TRUE(box.step(1e-4).converged);
+  const double area = (0.0277 - 0.0131) * (0.0159 - 0.0043), jet = 1 + 4 * 1e-4 / 0.5;  // the ramp at the step's end
+  const double exact = 0.2 * (0.05 * 0.02 - area) + jet * area;
+  EXPECT_NEAR(box.simple.balance().in / exact, 1, 1e-13);  // round-off
+}
+
+TEST(Hydrostatics, ClosedBoxAtRestCarriesTheWeightOfTheGas) {
+  GasSetup setup = still_air();
+  setup.gravity = {0, -9.81, 0};
+  setup.tolerance = 1e-8;
+  GasBox box({3, 8, 3}, {0.03, 0.08, 0.03}, {false, false, false}, setup);
+  for (int n = 0; n < 3; ++n) {
+    const GasOutcome outcome = box.step(1e-3);
+    ASSERT_TRUE(outcome.converged) << outcome.reason;
+  }
+  const double drop = box.state.pressure(1, 0, 1) - box.state.pressure(1, 7, 1);
+  EXPECT_NEAR(drop / (1.2 * 9.81 * 0.07), 1, 1e-7);  // tolerance
+  EXPECT_LT(std::abs(box.state.velocity[1](1, 4, 1)), 1e-8 * 9.81e-3);
+}
+
+// State, to the bit, and a reason that names what is wrong.
+void expect_refused(GasBox& box, double dt, const std::string& word) {
+  const GasState before = box.state;
+  const GasOutcome outcome = box.step(dt, true);
+  EXPECT_FALSE(outcome.converged);
+  EXPECT_NE(outcome.reason.find(word), std::string::npos) << outcome.reason;
+  const auto same = [](double a, double b) { return a == b || (std::isnan(a) && std::isnan(b)); };
+  for (std::size_t i = 0; i < box.grid.size(); ++i) {
+    for (int d = 0; d < 3; ++d) ASSERT_TRUE(same(box.state.velocity[d].data()[i], before.velocity[d].data()[i]));
+    ASSERT_TRUE(same(box.state.pressure.data()[i], before.pressure.data()[i]));
+  }
+}
+
+TEST(NotConverged, TooFewIterationsRestoreTheStateAndSaySo) {
+  GasSetup setup = upright(0.5);
+  setup.tolerance = 1e-9;
+  setup.max_iterations = 3;
+  GasBox box({6, 8, 4}, {0.03, 0.04, 0.02}, {false, false, false}, setup);
+  expect_refused(box, 1e-3, "3 outer iterations");
+}
+
+TEST(NotConverged, FieldsThatAreNotFiniteRestoreTheStateAndSaySo) {
+  GasBox box({6, 8, 4}, {0.03, 0.04, 0.02}, {false, false, false}, upright(0.5));
+  ASSERT_TRUE(box.step(1e-3).converged);
+  box.exchange.drag[1](2, 3, 1) = std::numeric_limits<double>::quiet_NaN();
+  expect_refused(box, 1e-3, "not finite");
+  box.exchange.drag[1](2, 3, 1) = 0;
+  EXPECT_TRUE(box.step(1e-3, true).converged);  // nothing of it is left behind
+  box.state.velocity[0](2, 3, 1) = std::numeric_limits<double>::infinity();
+  expect_refused(box, 1e-3, "not finite");
+}
+
+TEST(NotConverged, ClosedBoxThatCannotBalanceIsNamed) {
+  GasSetup setup = still_air();
+  setup.faces[1][0] = Inflow{{0.5, 0, 0}, {}};
+  GasBox fed({4, 4, 4}, {0.04, 0.04, 0.04}, {false, false, false}, setup);
+  expect_refused(fed, 1e-3, "no outflow and cannot balance");
+  GasBox grown({4, 4, 4}, {0.04, 0.04, 0.04}, {true, true, true}, still_air());
+  grown.state.fraction_rate(1, 1, 1) = 1;
+  expect_refused(grown, 1e-3, "d eps/dt");
+  grown.state.fraction_rate(2, 1, 1) = -1;
+  EXPECT_TRUE(grown.step(1e-3).converged);
+}
+
+TEST(NotConverged, BuoyancyThatLeavesNoPressureForceIsNamed) {
+  GasBox box({4, 4, 4}, {0.04, 0.04, 0.04}, {true, true, true}, still_air());
+  box.exchange.buoyancy[2](1, 1, 1) = 1;
+  expect_refused(box, 1e-3, "buoyancy");
+}
+
+}  // namespace
+}  // namespace bedflow

@@ -1,0 +1,121 @@
+// The lid-driven cavity at Re 100 against Ghia, Ghia and Shin (1982): data/ghia1982_cavity_re100.csv.
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <sstream>
+#include <vector>
+
+#include "gas_box.h"
+
+namespace bedflow {
+namespace {
+
+struct Point {
+  char component;
+  double s, value;
+};
+
+std::vector<Point> ghia() {
+  std::ifstream file(BEDFLOW_SOURCE_DIR "/tests/verification/data/ghia1982_cavity_re100.csv");
+  std::vector<Point> points;
+  for (std::string line; std::getline(file, line);) {
+    if (line[0] != 'u' && line[0] != 'v') continue;
+    std::istringstream fields(line.substr(2));
+    Point point{line[0], 0, 0};
+    char comma = 0;
+    fields >> point.s >> comma >> point.value;
+    points.push_back(point);
+  }
+  return points;
+}
+
+// The cavity's plane is that of `along`, in which the lid moves, and `across`; it may lie any way.
+GasSetup cavity_setup(int along = 0, int across = 1) {
+  GasSetup setup = still_air();
+  setup.density = 1;
+  setup.viscosity = 0.01;
+  Vec3 lid;
+  lid[along] = 1;
+  setup.faces[along] = {NoSlip{}, NoSlip{}};
+  setup.faces[across] = {NoSlip{}, NoSlip{lid}};
+  return setup;
+}
+
+// Velocity on a centre line, linear between faces' centres and the walls.
+double on_centre_line(const GasBox& box, const Point& point, int n) {
+  const double at = point.s * n - 0.5;
+  const int below = static_cast<int>(std::floor(at));
+  const auto value = [&](int i) {
+    return point.component == 'u' ? box.state.velocity[0](n / 2, i, 0) : box.state.velocity[1](i, n / 2, 0);
+  };
+  const double lid = point.component == 'u' ? 1 : 0;
+  if (below < 0) return value(0) * 2 * (at + 0.5);
+  if (below >= n - 1) return value(n - 1) + (lid - value(n - 1)) * 2 * (at - (n - 1));
+  return value(below) + (at - below) * (value(below + 1) - value(below));
+}
+
+double mean_error(int n) {
+  GasSetup setup = cavity_setup();
+  setup.tolerance = 1e-5;
+  GasBox box({n, n, 1}, {1, 1, 1.0 / n}, {false, false, false}, setup);
+  EXPECT_TRUE(box.settle(0.2, 1e-6, 400));
+  double sum = 0;
+  const std::vector<Point> points = ghia();
+  for (const Point& point : points) sum += std::abs(on_centre_line(box, point, n) - point.value);
+  return sum / static_cast<double>(points.size());
+}
+
+TEST(Cavity, UpwindConvergesToGhiaWithFirstOrder) {
+  ASSERT_EQ(ghia().size(), 34u);
+  const double coarse = mean_error(12), middle = mean_error(24), fine = mean_error(48);
+  EXPECT_LT(fine, 0.01);                            // of the lid's speed
+  EXPECT_NEAR(std::log2(coarse / middle), 1, 0.3);  // upwind's order; 0.3: 12 cells do not resolve the lid's layer
+  EXPECT_NEAR(std::log2(middle / fine), 1, 0.3);
+}
+
+TEST(Cavity, OneStepOfAnyLengthReachesTheSteadyState) {
+  const int n = 16;
+  GasSetup setup = cavity_setup();
+  setup.tolerance = 1e-6;
+  GasBox slow({n, n, 1}, {1, 1, 1.0 / n}, {false, false, false}, setup),
+      fast({n, n, 1}, {1, 1, 1.0 / n}, {false, false, false}, setup);
+  ASSERT_TRUE(slow.settle(0.2, 1e-7, 400));
+  const GasOutcome outcome = fast.step(1e6);
+  ASSERT_TRUE(outcome.converged) << outcome.reason;
+  fast.for_cells([&](int i, int j, int k) {
+    for (int d = 0; d < 2; ++d)
+      EXPECT_NEAR(fast.state.velocity[d](i, j, k), slow.state.velocity[d](i, j, k), 2e-5);  // settled to 1e-7 a step
+  });
+}
+
+// Six ways to lay the cavity; all but the order of sums is the same.
+TEST(Cavity, DoesNotKnowTheAxes) {
+  const int n = 10;
+  const auto run = [&](int along, int across) {
+    GasSetup setup = cavity_setup(along, across);
+    setup.tolerance = 1e-10;
+    Int3 cells{3, 3, 3};
+    cells[along] = cells[across] = n;
+    auto box = std::make_unique<GasBox>(cells, Vec3{1, 1, 1}, std::array<bool, 3>{false, false, false}, setup);
+    for (int step = 0; step < 3; ++step) EXPECT_TRUE(box->step(0.1).converged);
+    return box;
+  };
+  const auto reference = run(0, 1);
+  for (const auto& [along, across] : {std::pair{0, 2}, {1, 0}, {1, 2}, {2, 0}, {2, 1}}) {
+    const auto box = run(along, across);
+    const int third = 3 - along - across;
+    reference->for_cells([&, along = along, across = across](int i, int j, int k) {
+      Int3 at{};
+      at[along] = i;
+      at[across] = j;
+      at[third] = k;
+      const int to[3] = {along, across, third};
+      for (int d = 0; d < 3; ++d)
+        ASSERT_NEAR(box->state.velocity[to[d]](at[0], at[1], at[2]), reference->state.velocity[d](i, j, k),
+                    1e-8);  // 100 tolerances
+    });
+  }
+}
+
+}  // namespace
+}  // namespace bedflow
