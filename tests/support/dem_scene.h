@@ -45,8 +45,9 @@ class Scene {
  public:
   Scene(const Comm& comm, Vec3 size, const Spheres& spheres, Int3 cells = {8, 8, 8})
       : spheres_(spheres),
-        decomposition_(comm, cells, size,
-                       {spheres.sides[0] == Side::periodic, spheres.sides[1] == Side::periodic, spheres.sides[2] == Side::periodic}),
+        decomposition_(
+            comm, cells, size,
+            {spheres.sides[0] == Side::periodic, spheres.sides[1] == Side::periodic, spheres.sides[2] == Side::periodic}),
         dem(decomposition_, setup(spheres), timer) {}
 
   void place(const std::vector<PlacedSphere>& spheres) { take(seed_placed(decomposition_, spheres)); }
@@ -66,8 +67,7 @@ class Scene {
     const std::vector<double> all = decomposition_.comm().gather_all(mine);
     std::map<std::int64_t, Particle> result;
     for (auto row = all.begin(); row != all.end(); row += 10)
-      result[static_cast<std::int64_t>(row[0])] = {
-          {row[1], row[2], row[3]}, {row[4], row[5], row[6]}, {row[7], row[8], row[9]}};
+      result[static_cast<std::int64_t>(row[0])] = {{row[1], row[2], row[3]}, {row[4], row[5], row[6]}, {row[7], row[8], row[9]}};
     return result;
   }
 

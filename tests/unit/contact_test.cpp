@@ -13,8 +13,9 @@ TEST(Contact, CollisionTimeAndDampingAreThoseOfTheBeds) {
   struct Bed {
     double mass, stiffness, restitution, damping, time;
   };
-  for (const Bed& bed : {Bed{2.0419e-05, 2519, 0.97, 3.10951e-03, 2.0001e-04}, Bed{9.0478e-07, 440, 0.97, 2.73565e-04, 1.0074e-04},
-                         Bed{8.7212e-05, 43000, 0.97, 2.65513e-02, 1.0005e-04}, Bed{2.0442e-05, 1000, 0.84, 1.12043e-02, 3.1810e-04}}) {
+  for (const Bed& bed :
+       {Bed{2.0419e-05, 2519, 0.97, 3.10951e-03, 2.0001e-04}, Bed{9.0478e-07, 440, 0.97, 2.73565e-04, 1.0074e-04},
+        Bed{8.7212e-05, 43000, 0.97, 2.65513e-02, 1.0005e-04}, Bed{2.0442e-05, 1000, 0.84, 1.12043e-02, 3.1810e-04}}) {
     const auto law = LinearSpringDashpot::from_restitution(bed.stiffness, bed.restitution, bed.mass / 2);
     EXPECT_NEAR(law.damping, bed.damping, 3e-5 * bed.damping);
     EXPECT_NEAR(law.collision_time(bed.mass / 2), bed.time, 5e-5 * bed.time);
