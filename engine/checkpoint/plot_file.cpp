@@ -65,6 +65,7 @@ std::vector<Gathered> gather(const Comm& comm, const std::vector<PlotArray>& arr
     }
   });
   std::vector<Gathered> result;
+  result.reserve(arrays.size());
   for (const PlotArray& array : arrays) result.push_back(gather(comm, array));
   return result;
 }

@@ -163,11 +163,11 @@ std::uint32_t metadata_checksum(const PosixFile& file, const Seal& seal, const M
   std::uint64_t done = 0;
   std::vector<std::byte> buffer(block_bytes);
   for (const auto& [place, bytes] : known) {
-    if (place < done) throw Stop(Reason::internal, file.path().string() + ": datasets overlap");
+    if (place < done) throw Stop(Reason::checkpoint_corrupt, file.path().string() + ": datasets overlap");
     while (done < place) {
       const std::size_t count = std::min(block_bytes, place - done);
       if (file.read(std::span(buffer).first(count), done) < count)
-        throw Stop(Reason::internal, file.path().string() + ": cut short");
+        throw Stop(Reason::checkpoint_corrupt, file.path().string() + ": cut short");
       crc = raw_crc(buffer.data(), count, crc);
       done += count;
     }

@@ -61,7 +61,8 @@ struct Manifest {
 // The manifest of a file whose seal is good; nothing, and why in `fault`, when it is damaged.
 std::optional<Manifest> read_manifest(const PosixFile& file, const Seal& seal, std::string& fault);
 
-// CRC32C of all bytes that are neither seal nor manifest nor data. Throws Stop(internal) when places overlap.
+// CRC32C of all bytes that are neither seal nor manifest nor data. Throws Stop(checkpoint_corrupt) when places overlap or lie
+// beyond the end.
 std::uint32_t metadata_checksum(const PosixFile& file, const Seal& seal, const Manifest& manifest);
 
 // Blocks part, part + parts, … of all datasets against their checksums; a line each that is wrong, with dataset and block.

@@ -92,11 +92,13 @@ void check_epoch(const fs::path& folder, std::uint32_t epoch) {
   }
 }
 
-// What remains too many, or was left unfinished by this attempt or one before it. Not being able to remove is no failure.
-void prune(const fs::path& folder, int keep, std::uint32_t epoch) {
+// Beyond the newest up to this step, what is too many; those of later steps, which a resume from an earlier one has made void;
+// and what this attempt or one before it left unfinished. Not being able to remove is no failure.
+void prune(const fs::path& folder, std::uint64_t step, int keep, std::uint32_t epoch) {
   std::error_code ignored;
-  const std::vector<CheckpointInfo> kept = list_checkpoints(folder);
-  for (std::size_t i = static_cast<std::size_t>(std::max(keep, 2)); i < kept.size(); ++i) fs::remove(kept[i].path, ignored);
+  int kept = 0;
+  for (const CheckpointInfo& info : list_checkpoints(folder))
+    if (info.step > step || ++kept > std::max(keep, 2)) fs::remove(info.path, ignored);
   std::vector<fs::path> torn;
   for (const auto& entry : fs::directory_iterator(folder, ignored)) {
     const std::optional<std::uint32_t> attempt = attempt_of_partial(entry.path());
@@ -141,7 +143,7 @@ CheckpointInfo write_checkpoint(const Comm& comm, const fs::path& folder_given, 
       if (!comm.root()) return;
       check_epoch(folder, epoch);
       rename_for_good(partial, target);
-      prune(folder, keep, epoch);
+      prune(folder, content.step, keep, epoch);
     });
   } catch (const Stop&) {
     std::error_code ignored;

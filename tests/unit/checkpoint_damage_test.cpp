@@ -8,6 +8,7 @@
 #include <random>
 
 #include "checkpoint/posix_file.h"
+#include "checkpoint/seal.h"
 #include "unit/checkpoint_test_case.h"
 
 namespace bedflow {
@@ -116,6 +117,41 @@ TEST_F(CheckpointDamage, ForeignAndHostileBytesAreRefused) {
   }
   EXPECT_NE(verify_checkpoint(folder_.job() / "nothing.h5").at(0).find("No such file"), std::string::npos);
   EXPECT_FALSE(verify_checkpoint(folder_.job()).empty());  // a folder
+}
+
+TEST_F(CheckpointDamage, ASealThatLiesIsFound) {
+  std::string fault;
+  const Seal good = Seal::read(PosixFile(copy_, PosixFile::Mode::read), fault).value();
+  constexpr std::uint64_t far = UINT64_MAX;
+  for (const auto& [member, value] : std::vector<std::pair<std::uint64_t Seal::*, std::uint64_t>>{{&Seal::file_bytes, far},
+                                                                                                  {&Seal::file_bytes, 600},
+                                                                                                  {&Seal::file_bytes, 0},
+                                                                                                  {&Seal::manifest_place, far},
+                                                                                                  {&Seal::manifest_place, 0},
+                                                                                                  {&Seal::manifest_bytes, far},
+                                                                                                  {&Seal::manifest_bytes, 0}}) {
+    Seal lie = good;
+    lie.*member = value;
+    lie.write(PosixFile(copy_, PosixFile::Mode::write));
+    EXPECT_FALSE(verify_checkpoint(copy_).empty()) << value;
+    EXPECT_THROW(CheckpointReader(Comm::self(), copy_), Stop) << value;
+  }
+}
+
+TEST(Manifest, MutilatedTextIsRefusedOrHarmless) {
+  const Manifest good{{{"a", 512, 3 << 20, {1, 2, 3}}, {"b/c", 1 << 22, 0, {}}, {"d", 1 << 23, 5, {4}}}};
+  const std::string text = good.text();
+  EXPECT_EQ(Manifest::parse(text, 1 << 24).value().text(), text);
+  EXPECT_FALSE(Manifest::parse(text, 1 << 20).has_value()) << "entries beyond the file's end";
+  std::mt19937_64 random(3);
+  for (int trial = 0; trial < 20000; ++trial) {
+    std::string changed = text;
+    for (int flips = 0; flips < 3; ++flips) changed[random() % changed.size()] = "0f \nZ\xff"[random() % 6];
+    if (trial % 3 == 0) changed.resize(random() % changed.size());
+    const std::optional<Manifest> read = Manifest::parse(changed, 1 << 24);
+    for (const ManifestEntry& entry : read.value_or(Manifest{}).entries)
+      ASSERT_LE(entry.place + entry.bytes, 1U << 24) << changed;
+  }
 }
 
 TEST(NewestGoodCheckpoint, IsThePreviousOneWhenTheNewestIsDamaged) {

@@ -1,6 +1,7 @@
 // Plot files have the structure that ParaView wants, their series follows a resumed run, and a picture shows what was stored.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <fstream>
 
@@ -25,12 +26,17 @@ std::string read_text(const fs::path& path) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
+std::vector<Vec3> velocities_of(const std::vector<double>& pressure) {
+  std::vector<Vec3> velocity(pressure.size());
+  std::transform(pressure.begin(), pressure.end(), velocity.begin(), [](double p) { return Vec3{p, 2 * p, 3 * p}; });
+  return velocity;
+}
+
 void write_plots(const Comm& comm, const fs::path& folder, std::uint64_t step) {
   const double time = 0.1 * static_cast<double>(step);
   const GridPart part = test::part_of(comm);
   const std::vector<double> pressure = test::cells_of(part);
-  std::vector<Vec3> velocity;
-  for (double value : pressure) velocity.push_back({value, 2 * value, 3 * value});
+  const std::vector<Vec3> velocity = velocities_of(pressure);
   write_gas_plot(comm, folder, step, time, part, {0.1, 0.1, 0.1}, {{"pressure", "Pa", pressure}, {"velocity", "m/s", velocity}});
   std::vector<Vec3> position;
   std::vector<std::int64_t> id;
@@ -61,8 +67,7 @@ TEST(PlotFile, IsTheSameOnAnyNumberOfRanks) {
   if (!comm.root()) return;
   const GridPart part = test::part_of(Comm::self());
   const std::vector<double> pressure = test::cells_of(part);
-  std::vector<Vec3> velocity;
-  for (double value : pressure) velocity.push_back({value, 2 * value, 3 * value});
+  const std::vector<Vec3> velocity = velocities_of(pressure);
   write_gas_plot(Comm::self(), folder.job() / "one", 3, 0.1 * 3, part, {0.1, 0.1, 0.1},
                  {{"pressure", "Pa", pressure}, {"velocity", "m/s", velocity}});
   EXPECT_EQ(read_text(folder.job() / "many/gas_0000000003.hdf"), read_text(folder.job() / "one/gas_0000000003.hdf"));

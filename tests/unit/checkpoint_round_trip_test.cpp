@@ -103,6 +103,17 @@ TEST(Checkpoint, TheNewestAreKeptAndAtLeastTwo) {
   EXPECT_EQ(list_checkpoints(folder.checkpoints()).size(), 2U);
 }
 
+TEST(Checkpoint, AResumeFromAnEarlierOneMakesLaterOnesVoid) {
+  const Comm comm = Comm::world();
+  const SharedFolder folder(comm);
+  for (std::uint64_t step : {10, 20, 30}) write_checkpoint(comm, folder.checkpoints(), content_of(comm, step), 3);
+  write_checkpoint(comm, folder.checkpoints(), content_of(comm, 15), 3);  // resumed at step 10
+  comm.barrier();
+  std::vector<std::uint64_t> steps;
+  for (const CheckpointInfo& info : list_checkpoints(folder.checkpoints())) steps.push_back(info.step);
+  EXPECT_EQ(steps, (std::vector<std::uint64_t>{15, 10}));
+}
+
 TEST(Checkpoint, ATornPartialIsIgnoredAndSweptAway) {
   const Comm comm = Comm::world();
   const SharedFolder folder(comm);
