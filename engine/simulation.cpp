@@ -212,7 +212,7 @@ Observation Simulation::observation() {
     now.fraction = &gas_->state.fraction;
     const GasBalance balance = gas_->solver.balance();
     const double through = std::max({std::abs(balance.in), std::abs(balance.out), std::abs(balance.storage)});
-    now.mass_residual = through > 0 ? (balance.in - balance.out - balance.storage) / through : 0;
+    now.mass_residual = steps_ > 0 && through > 0 ? (balance.in - balance.out - balance.storage) / through : 0;
   }
   now.momentum_residual = exchange_residual_;
   if (dem_) {
@@ -234,9 +234,10 @@ Simulation::GasPlot Simulation::gas_plot() const {
       for (int i = 0; i < grid.cells[0]; ++i) {
         plot.pressure.push_back(gas.pressure(i, j, k));
         plot.fraction.push_back(gas.fraction(i, j, k));
+        Vec3& velocity = plot.velocity.emplace_back();
         for (int d = 0; d < 3; ++d) {
           const double upper = gas.velocity[d](i + (d == 0), j + (d == 1), k + (d == 2));
-          plot.velocity.push_back(0.5 * (gas.velocity[d](i, j, k) + upper));
+          velocity[d] = 0.5 * (gas.velocity[d](i, j, k) + upper);
         }
       }
   return plot;

@@ -49,7 +49,8 @@ class Simulation {
   // This rank's part of the gas at cell centres, for plot files.
   struct GasPlot {
     GridPart part;
-    std::vector<double> pressure, fraction, velocity;  // velocity: x, y, z a cell
+    std::vector<double> pressure, fraction;  // Pa, 1
+    std::vector<Vec3> velocity;              // m/s
   };
   GasPlot gas_plot() const;
   const Dem* particles() const { return dem_.get(); }

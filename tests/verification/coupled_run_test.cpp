@@ -1,0 +1,182 @@
+// The whole engine: resume, rank counts, scenes that lack a part.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstring>
+
+#include "support/scene.h"
+
+namespace bedflow {
+namespace {
+
+const std::string coulomb = "coulomb { friction: 0.3 }", spring = "spring { friction: 0.3 }", frictionless = "frictionless {}";
+
+// Everything that a state is made of, bit by bit, in an order that does not know the ranks' storage.
+struct State {
+  std::vector<double> values;
+  bool operator==(const State& other) const {
+    return values.size() == other.values.size() && std::memcmp(values.data(), other.values.data(), values.size() * 8) == 0;
+  }
+};
+State state_of(const Simulation& simulation) {
+  const CheckpointContent content = simulation.checkpoint();
+  State state{{static_cast<double>(content.step), content.time}};
+  for (const auto& [name, value] : content.numbers) state.values.push_back(value);
+  for (const CheckpointArray& array : content.arrays) {
+    if (const auto* reals = std::get_if<std::vector<double>>(&array.values)) {
+      state.values.insert(state.values.end(), reals->begin(), reals->end());
+    } else if (const auto* integers = std::get_if<std::vector<std::int64_t>>(&array.values)) {
+      state.values.insert(state.values.end(), integers->begin(), integers->end());
+    }
+  }
+  return state;
+}
+
+void run(Simulation& simulation, int steps) {
+  for (int s = 0; s < steps; ++s) simulation.step();
+  ASSERT_FALSE(simulation.failure()) << simulation.failure().message;
+}
+
+class Resume : public testing::TestWithParam<std::string> {};
+
+// The claim of METHOD and SERVICE: same binary, case and ranks give the same bits, run through or stopped and resumed.
+TEST_P(Resume, IsTheUninterruptedRunBitForBit) {
+  const Comm world = Comm::world();
+  const Plan plan = make_plan(scene_of(world, small_bed(GetParam())), world.size());
+  const TestFolder folder(world);
+  PhaseTimer timer;
+  Simulation through(plan, world, timer);
+  through.seed();
+  run(through, 40);
+  const CheckpointInfo info = write_checkpoint(world, folder.path(), through.checkpoint(), 2);
+  run(through, 60);
+
+  Simulation resumed(plan, world, timer);
+  resumed.restore(CheckpointReader(world, info.path));
+  run(resumed, 60);
+  EXPECT_TRUE(state_of(resumed) == state_of(through));
+  // The comparison can fail: one more step is another state.
+  run(resumed, 1);
+  EXPECT_FALSE(state_of(resumed) == state_of(through));
+}
+INSTANTIATE_TEST_SUITE_P(EveryTangentialLaw, Resume, testing::Values(coulomb, spring, frictionless));
+
+struct Found {
+  std::vector<Vec3> position;  // by id
+  double kinetic = 0, fraction = 0, pressure = 0;
+  std::size_t contacts = 0;
+};
+Found found(const Simulation& simulation, const Comm& comm) {
+  Found result;
+  const ParticleStore& store = simulation.particles()->particles();
+  std::vector<double> rows;
+  for (std::size_t p = 0; p < store.owned; ++p) {
+    rows.insert(rows.end(), {static_cast<double>(store.id[p]), store.position[p].x, store.position[p].y, store.position[p].z});
+  }
+  rows = comm.gather_all(rows);
+  result.position.resize(rows.size() / 4);
+  for (std::size_t r = 0; r < rows.size(); r += 4)
+    result.position[static_cast<std::size_t>(rows[r])] = {rows[r + 1], rows[r + 2], rows[r + 3]};
+  result.kinetic = comm.sum(simulation.particles()->kinetic_energy());
+  result.contacts = static_cast<std::size_t>(comm.sum(simulation.particles()->contacts()));
+  const Simulation::GasPlot gas = simulation.gas_plot();
+  for (const double value : gas.fraction) result.fraction += value;
+  for (const double value : gas.pressure) result.pressure += value;
+  result.fraction = comm.sum(result.fraction);
+  result.pressure = comm.sum(result.pressure);
+  return result;
+}
+
+// Other ranks sum in another order and stop the linear solvers elsewhere: SIMPLE's tolerance (1e-9 here) is what the fields may
+// differ by, and a particle's path with it. 20 steps are too short for a collision to magnify that beyond 1e-6 diameters.
+void expect_alike(const Found& a, const Found& b) {
+  ASSERT_EQ(a.position.size(), b.position.size());
+  double furthest = 0;
+  for (std::size_t i = 0; i < a.position.size(); ++i) furthest = std::max(furthest, norm(a.position[i] - b.position[i]));
+  EXPECT_LT(furthest, 1e-6 * 0.0012);
+  EXPECT_NEAR(a.kinetic / b.kinetic, 1, 1e-6);
+  EXPECT_NEAR(a.fraction / b.fraction, 1, 1e-9);
+  EXPECT_NEAR(a.pressure / b.pressure, 1, 1e-5);
+  EXPECT_EQ(a.contacts, b.contacts);
+}
+std::string tight_bed() {
+  std::string text = small_bed(spring);
+  const std::string loose = "simple {}";
+  return text.replace(text.find(loose), loose.size(), "simple { tolerance: 1e-9 pressure_tolerance: 1e-6 max_iterations: 2000 }");
+}
+
+TEST(Ranks, AgreeWithOneRank) {
+  const Comm world = Comm::world(), self = Comm::self();
+  const std::string text = tight_bed();
+  PhaseTimer timer;
+  Simulation together(make_plan(scene_of(world, text), world.size()), world, timer);
+  Simulation alone(make_plan(scene_of(world, text), 1), self, timer);
+  for (Simulation* simulation : {&together, &alone}) {
+    simulation->seed();
+    run(*simulation, 20);
+  }
+  expect_alike(found(together, world), found(alone, self));
+}
+
+TEST(Ranks, ACheckpointGoesOnOnAnotherNumberOfRanks) {
+  const Comm world = Comm::world(), self = Comm::self();
+  const std::string text = tight_bed();
+  const TestFolder folder(world);
+  PhaseTimer timer;
+  Simulation together(make_plan(scene_of(world, text), world.size()), world, timer);
+  together.seed();
+  run(together, 20);
+  const CheckpointInfo info = write_checkpoint(world, folder.path(), together.checkpoint(), 2);
+  Simulation alone(make_plan(scene_of(world, text), 1), self, timer);
+  alone.restore(CheckpointReader(self, info.path));
+  const Found before = found(together, world), taken = found(alone, self);
+  EXPECT_EQ(before.position, taken.position);  // the same particles at the same places
+  run(together, 20);
+  run(alone, 20);
+  expect_alike(found(together, world), found(alone, self));
+}
+
+TEST(Scene, OfGasAloneAndOfParticlesAloneRun) {
+  const Comm world = Comm::world();
+  PhaseTimer timer;
+  Simulation gas(make_plan(scene_of(world, R"(name: "gas" domain { size { x: 0.04 y: 0.04 z: 0.04 } cells { x: 8 y: 8 z: 8 }
+    faces { y_low { inflow { velocity: 1 } } y_high { outflow {} } } } gravity {} gas { density: 1.2 viscosity: 1.8e-5 simple {} upwind {} }
+    time { end: 1 step: 1e-3 })"),
+                           world.size()),
+                 world, timer);
+  gas.seed();
+  run(gas, 5);
+  EXPECT_EQ(gas.particles(), nullptr);
+  EXPECT_LT(std::abs(gas.observation().mass_residual), 1e-3);
+
+  Simulation dem(make_plan(scene_of(world, R"(name: "dem" domain { size { x: 0.04 y: 0.04 z: 0.04 } } gravity { y: -9.81 }
+    particles { diameter: 0.002 density: 1000 linear_spring_dashpot { stiffness: 1000 restitution: 0.5 } frictionless {} symplectic_euler {}
+    random { count: 500 seed: 1 } } time { end: 1 })"),
+                           world.size()),
+                 world, timer);
+  dem.seed();
+  run(dem, 5);
+  EXPECT_EQ(dem.grid(), nullptr);
+  EXPECT_EQ(dem.particle_count(), 500);
+}
+
+TEST(Scene, ACheckpointOfAnotherSceneIsRefusedByField) {
+  const Comm world = Comm::world();
+  const TestFolder folder(world);
+  PhaseTimer timer;
+  Simulation bed(make_plan(scene_of(world, small_bed(coulomb)), world.size()), world, timer);
+  bed.seed();
+  const CheckpointInfo info = write_checkpoint(world, folder.path(), bed.checkpoint(), 2);
+  std::string text = small_bed(coulomb);
+  Simulation other(make_plan(scene_of(world, text.replace(text.find("y: 14"), 5, "y: 15")), world.size()), world, timer);
+  try {
+    other.restore(CheckpointReader(world, info.path));
+    FAIL() << "it was accepted";
+  } catch (const Stop& stop) {
+    EXPECT_EQ(stop.reason, Reason::invalid_case);
+    EXPECT_NE(std::string(stop.what()).find("domain.cells.y"), std::string::npos) << stop.what();
+  }
+}
+
+}  // namespace
+}  // namespace bedflow
