@@ -1,0 +1,51 @@
+// The gRPC calls, one at a time, each with a deadline; a refused call becomes a Failure with its exit code.
+#pragma once
+
+#include <grpcpp/grpcpp.h>
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "bedflow/v1/service.grpc.pb.h"
+#include "failure.h"
+
+namespace bedflow::client {
+
+using Stub = v1::JobService::Stub;
+
+// unix:$XDG_STATE_HOME/bedflow/bedflowd.sock, or below ~/.local/state: where a bedflowd without options listens.
+std::string default_address();
+
+class Connection {
+ public:
+  // A gRPC target: "unix:/path/to/socket" or "127.0.0.1:port". Nothing is sent yet.
+  explicit Connection(std::string address);
+
+  template <class Request, class Response>
+  using Method = grpc::Status (Stub::*)(grpc::ClientContext*, const Request&, Response*);
+
+  // Waits at most so many seconds. Throws Failure.
+  template <class Request, class Response>
+  Response call(Method<Request, Response> method, const Request& request, double seconds = 10) const {
+    Response response;
+    const auto status = run([&](grpc::ClientContext* context) { return (stub_.get()->*method)(context, request, &response); }, seconds);
+    if (!status.ok()) throw failure_of(status);
+    return response;
+  }
+
+  v1::Job get_job(const std::string& id, bool with_case = false) const;
+
+  Stub& stub() const { return *stub_; }
+  const std::string& address() const { return address_; }
+  Failure failure_of(const grpc::Status& status) const;
+
+ private:
+  using Attempt = std::function<grpc::Status(grpc::ClientContext*)>;
+  grpc::Status run(const Attempt& attempt, double seconds) const;
+
+  std::string address_;
+  std::unique_ptr<Stub> stub_;
+};
+
+}  // namespace bedflow::client

@@ -1,0 +1,67 @@
+#include "job_request.h"
+
+#include <chrono>
+#include <random>
+#include <thread>
+
+#include "case_source.h"
+#include "terminal.h"
+
+namespace bedflow::client {
+
+namespace {
+
+std::string random_id() {
+  std::random_device device;
+  std::string id;
+  for (int i = 0; i < 32; ++i) id += "0123456789abcdef"[device() % 16];
+  return id;
+}
+
+}  // namespace
+
+void add_job_options(CLI::App* verb, JobOptions& options) {
+  verb->add_option("--set", options.set, "change a parameter, as in time.end=2")->type_name("PATH=VALUE");
+  verb->add_option("--end", options.end, "simulated time at which to end, s")->check(CLI::PositiveNumber);
+  verb->add_option("--ranks", options.ranks, "MPI ranks")->check(CLI::Range(1, 100000))->default_str("1");
+  verb->add_option("--checkpoint-every", options.checkpoint_every, "simulated time between checkpoints, s")->check(CLI::PositiveNumber);
+  verb->add_option("--checkpoint-steps", options.checkpoint_steps, "steps between checkpoints")->check(CLI::PositiveNumber);
+  verb->add_option("--wall-limit", options.wall_limit, "stop after so much wall time, s")->check(CLI::PositiveNumber);
+  verb->add_option("--label", options.labels, "label to find the job by")->type_name("NAME=VALUE");
+}
+
+v1::CreateJobRequest create_request(const JobOptions& options) {
+  v1::CreateJobRequest request;
+  request.set_request_id(random_id());
+  if (!options.where.empty()) {
+    auto set = options.set;
+    if (options.end) set.push_back("time.end=" + CLI::detail::to_string(*options.end));
+    *request.mutable_case_() = load_case(options.where, set);
+  }
+  auto& spec = *request.mutable_spec();
+  spec.set_ranks(options.ranks.value_or(1));
+  if (options.checkpoint_every) spec.mutable_checkpoints()->set_every_simulated_seconds(*options.checkpoint_every);
+  if (options.checkpoint_steps) spec.mutable_checkpoints()->set_every_steps(*options.checkpoint_steps);
+  if (options.wall_limit) spec.set_wall_limit_seconds(*options.wall_limit);
+  for (const auto& label : options.labels) {
+    const auto equals = label.find('=');
+    if (equals == label.npos || equals == 0) throw Failure(Exit::usage, "--label " + label + ": not of the form NAME=VALUE");
+    (*spec.mutable_labels())[label.substr(0, equals)] = label.substr(equals + 1);
+  }
+  return request;
+}
+
+v1::CreateJobResponse create_job(const Connection& connection, const v1::CreateJobRequest& request) {
+  constexpr int most = 5;
+  for (int attempt = 1;; ++attempt) {
+    try {
+      return connection.call(&Stub::CreateJob, request, 60);
+    } catch (const Failure& failure) {
+      const bool lost = failure.code == Exit::unreachable || failure.code == Exit::timed_out;
+      if (!lost || attempt == most) throw;
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(200 * attempt));
+  }
+}
+
+}  // namespace bedflow::client

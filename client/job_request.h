@@ -1,0 +1,33 @@
+// What `submit` and `run` ask of a new job.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "bedflow/v1/service.pb.h"
+#include "connection.h"
+
+namespace bedflow::client {
+
+struct JobOptions {
+  std::string where;
+  std::vector<std::string> set;
+  std::optional<double> end;                // s
+  std::optional<std::uint32_t> ranks;       // 1 if absent
+  std::optional<double> checkpoint_every;   // simulated s
+  std::optional<std::uint64_t> checkpoint_steps;
+  std::optional<double> wall_limit;         // s
+  std::vector<std::string> labels;          // name=value
+};
+
+void add_job_options(CLI::App* verb, JobOptions& options);
+
+// With a random request id, so that the call may be repeated. Throws Failure when the case has faults.
+v1::CreateJobRequest create_request(const JobOptions& options);
+
+// Repeats a call whose answer was lost: the request id makes that harmless.
+v1::CreateJobResponse create_job(const Connection& connection, const v1::CreateJobRequest& request);
+
+}  // namespace bedflow::client

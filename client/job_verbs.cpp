@@ -1,0 +1,189 @@
+// submit, list, get, cancel, suspend, resume: jobs on a server.
+#include "job_request.h"
+#include "job_table.h"
+#include "live_view.h"
+#include "terminal.h"
+#include "verbs.h"
+
+namespace bedflow::client {
+
+namespace {
+
+struct SubmitOptions : JobOptions {
+  std::string start_from, request_id;
+  bool validate_only = false, watch = false;
+  Format format = Format::table;
+};
+
+// JOB or JOB@STEP.
+v1::CheckpointName checkpoint_name(const std::string& text) {
+  v1::CheckpointName name;
+  const auto at = text.find('@');
+  name.set_job(text.substr(0, at));
+  if (at == text.npos) return name;
+  const auto step = text.substr(at + 1);
+  if (step.empty() || step.size() > 18 || step.find_first_not_of("0123456789") != step.npos) {
+    throw Failure(Exit::usage, "--start-from " + text + ": the step after @ is not a number", "bedflow checkpoint list " + name.job());
+  }
+  name.set_step(std::stoull(step));
+  return name;
+}
+
+Exit submit(const Program& program, const SubmitOptions& options) {
+  Interrupt interrupt;
+  if (options.where.empty() && options.start_from.empty()) {
+    throw Failure(Exit::usage, "a case is missing", "bedflow submit CASE, or bedflow submit --start-from JOB");
+  }
+  if (options.where.empty() && (!options.set.empty() || options.end)) {
+    throw Failure(Exit::usage, "--set and --end change a case that is given; with --start-from alone it is the checkpoint's own",
+                  "bedflow get " + options.start_from + " --case > case.txtpb, then submit that with --start-from");
+  }
+  auto request = create_request(options);
+  if (!options.request_id.empty()) request.set_request_id(options.request_id);
+  if (options.validate_only) request.set_validate_only(true);
+  if (!options.start_from.empty()) *request.mutable_start_from() = checkpoint_name(options.start_from);
+  const Connection connection(program.server);
+  const auto response = create_job(connection, request);
+  if (options.validate_only) {
+    Table table({"part", "on", "why"});
+    for (const auto& item : response.plan().items()) table.add({item.part(), item.on(), item.why()});
+    if (options.format == Format::table && response.plan().has_text()) print_data(response.plan().text() + "\n");
+    else print_message(response.plan(), table, options.format);
+    say("nothing was submitted (--validate-only)");
+    return Exit::ok;
+  }
+  const auto& id = response.job().id();
+  if (options.format == Format::table) print_data(id + "\n");
+  else print_message(response.job(), table_of(std::vector{response.job()}), options.format);
+  if (!options.watch) {
+    say("submitted; next: bedflow watch " + id);
+    return Exit::ok;
+  }
+  LiveOptions live;
+  live.detached = {"come back: bedflow watch " + id, "cancel:    bedflow cancel " + id};
+  return view_job(connection, id, live, interrupt).exit;
+}
+
+struct ListOptions {
+  std::vector<std::string> states, labels;
+  std::uint32_t most = 50;
+  Format format = Format::table;
+};
+
+Exit list(const Program& program, const ListOptions& options) {
+  v1::ListJobsRequest request;
+  for (auto name : options.states) {
+    for (char& c : name) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+    v1::JobState state;
+    if (!v1::JobState_Parse(name, &state) && !v1::JobState_Parse("STATE_" + name, &state)) {
+      throw Failure(Exit::usage, "--state " + name + " is no state of a job");
+    }
+    request.add_states(state);
+  }
+  for (const auto& label : options.labels) {
+    const auto equals = label.find('=');
+    if (equals == label.npos) throw Failure(Exit::usage, "--label " + label + ": not of the form NAME=VALUE");
+    (*request.mutable_labels())[label.substr(0, equals)] = label.substr(equals + 1);
+  }
+  const Connection connection(program.server);
+  std::vector<v1::Job> jobs;
+  std::string page;
+  do {
+    request.set_page_size(std::min<std::uint32_t>(1000, options.most - static_cast<std::uint32_t>(jobs.size())));
+    request.set_page_token(page);
+    const auto response = connection.call(&Stub::ListJobs, request);
+    jobs.insert(jobs.end(), response.jobs().begin(), response.jobs().end());
+    page = response.next_page_token();
+  } while (!page.empty() && jobs.size() < options.most);
+  if (jobs.empty()) say("no jobs; submit one with: bedflow submit CASE");
+  if (!jobs.empty() || options.format != Format::table) print_messages(pointers(jobs), table_of(jobs), options.format);
+  if (!page.empty()) say("there are more; the newest " + std::to_string(jobs.size()) + " are shown, --most shows more");
+  return Exit::ok;
+}
+
+struct OneJobOptions {
+  std::string job;
+  bool with_case = false, skip_checkpoint = false;
+  std::optional<std::uint64_t> step;
+  std::optional<std::uint32_t> ranks;
+  Format format = Format::table;
+};
+
+Exit get(const Program& program, const OneJobOptions& options) {
+  const auto job = Connection(program.server).get_job(options.job, options.with_case);
+  if (options.with_case && options.format == Format::table) {
+    print_data(case_text(job.case_()));
+  } else {
+    print_message(job, table_of(job), options.format);
+  }
+  return Exit::ok;
+}
+
+Exit show_changed(const v1::Job& job, Format format) {
+  if (format != Format::table) print_message(job, table_of(std::vector{job}), format);
+  say(job.id() + " is " + state_name(job.state()) + (is_final(job.state()) ? "" : "; next: bedflow watch " + job.id()));
+  return Exit::ok;
+}
+
+Exit cancel(const Program& program, const OneJobOptions& options) {
+  v1::CancelJobRequest request;
+  request.set_id(options.job);
+  if (options.skip_checkpoint) request.set_skip_checkpoint(true);
+  return show_changed(Connection(program.server).call(&Stub::CancelJob, request), options.format);
+}
+
+Exit suspend(const Program& program, const OneJobOptions& options) {
+  v1::SuspendJobRequest request;
+  request.set_id(options.job);
+  return show_changed(Connection(program.server).call(&Stub::SuspendJob, request), options.format);
+}
+
+Exit resume(const Program& program, const OneJobOptions& options) {
+  v1::ResumeJobRequest request;
+  request.set_id(options.job);
+  if (options.step) request.set_step(*options.step);
+  if (options.ranks) request.set_ranks(*options.ranks);
+  return show_changed(Connection(program.server).call(&Stub::ResumeJob, request, 60), options.format);
+}
+
+}  // namespace
+
+void add_job_verbs(CLI::App& app, Program& program) {
+  const auto submit_options = std::make_shared<SubmitOptions>();
+  auto* verb = app.add_subcommand("submit", "hand a case to the server; prints the id of the job");
+  verb->add_option("case", submit_options->where, "file, - for stdin, or a ready case");
+  add_job_options(verb, *submit_options);
+  verb->add_option("--start-from", submit_options->start_from, "start from a checkpoint of a job")->type_name("JOB[@STEP]");
+  verb->add_option("--request-id", submit_options->request_id, "8 to 64 letters, digits and -; the same id gives the same job");
+  verb->add_flag("--validate-only", submit_options->validate_only, "every check, the plan and the estimate; no job");
+  verb->add_flag("--watch", submit_options->watch, "follow the job");
+  add_format(verb, submit_options->format);
+  on_call(verb, program, submit_options, submit);
+
+  const auto list_options = std::make_shared<ListOptions>();
+  verb = app.add_subcommand("list", "list the jobs, newest first");
+  verb->add_option("--state", list_options->states, "only in this state")->type_name("STATE");
+  verb->add_option("--label", list_options->labels, "only with this label")->type_name("NAME=VALUE");
+  verb->add_option("--most", list_options->most, "at most so many")->check(CLI::PositiveNumber)->capture_default_str();
+  add_format(verb, list_options->format);
+  on_call(verb, program, list_options, list);
+
+  const auto one_job = [&](const char* name, const char* meaning, Exit (*function)(const Program&, const OneJobOptions&)) {
+    const auto options = std::make_shared<OneJobOptions>();
+    verb = app.add_subcommand(name, meaning);
+    verb->add_option("job", options->job, "id of the job")->required();
+    add_format(verb, options->format);
+    on_call(verb, program, options, function);
+    return options;
+  };
+  const auto get_options = one_job("get", "show a job", get);
+  verb->add_flag("--case", get_options->with_case, "its effective case");
+  const auto cancel_options = one_job("cancel", "stop a job for good, after a checkpoint", cancel);
+  verb->add_flag("--skip-checkpoint", cancel_options->skip_checkpoint, "stop at once, without a checkpoint");
+  one_job("suspend", "write a checkpoint and stop until resumed", suspend);
+  const auto resume_options = one_job("resume", "go on from a checkpoint", resume);
+  verb->add_option("--step", resume_options->step, "checkpoint of this step; the newest good one if absent");
+  verb->add_option("--ranks", resume_options->ranks, "on so many ranks; as before if absent")->check(CLI::Range(1, 100000));
+}
+
+}  // namespace bedflow::client

@@ -1,0 +1,70 @@
+// bedflow: the command-line client.
+#include <google/protobuf/stubs/common.h>
+
+#include <cstdlib>
+
+#include "connection.h"
+#include "verbs.h"
+
+namespace bedflow::client {
+
+void add_format(CLI::App* verb, Format& format) {
+  static const std::map<std::string, Format> names = {
+      {"table", Format::table}, {"json", Format::json}, {"jsonl", Format::jsonl}, {"csv", Format::csv}};
+  verb->add_option("-o,--output", format, "table, json, jsonl or csv")
+      ->transform(CLI::CheckedTransformer(names).description(""))
+      ->type_name("FORMAT")
+      ->default_str("table");
+}
+
+namespace {
+
+constexpr const char* kFooter =
+    "A first bed:   bedflow run mueller --ranks 2 --end 0.5\n"
+    "An own case:   bedflow init mueller > case.txtpb, edit, bedflow validate case.txtpb, bedflow run case.txtpb\n"
+    "Exit codes:    0 ok, 1 other, 2 usage or invalid case, 3 job failed, 4 not allowed, 5 not found, 6 wrong state,\n"
+    "               7 server unreachable, 8 timed out, 9 limit, quota or disk, 10 cancelled, 11 data corrupt, 130 interrupted";
+
+int run(int argc, char** argv) {
+  CLI::App app("bedflow: CFD-DEM of particle beds as a service", "bedflow");
+  Program program;
+  app.set_version_flag("--version", "bedflow " BEDFLOW_VERSION);
+  app.footer(kFooter);
+  app.require_subcommand(1);
+  app.fallthrough();
+  app.get_formatter()->column_width(34);
+  app.add_option("--server", program.server, "address of the server, unix:PATH or HOST:PORT")
+      ->envname("BEDFLOW_SERVER")
+      ->type_name("ADDRESS")
+      ->default_str("the socket of bedflowd");
+  add_run_verb(app, program);
+  add_case_verbs(app, program);
+  add_job_verbs(app, program);
+  add_watch_verbs(app, program);
+  add_result_verbs(app, program);
+  add_server_verbs(app, program);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    const bool asked_for_help = error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success);
+    app.exit(error);
+    return static_cast<int>(asked_for_help ? Exit::ok : Exit::usage);
+  }
+  if (program.server.empty()) program.server = default_address();
+  return static_cast<int>(program.verb());
+}
+
+}  // namespace
+}  // namespace bedflow::client
+
+int main(int argc, char** argv) {
+  try {
+    return bedflow::client::run(argc, argv);
+  } catch (const bedflow::client::Failure& failure) {
+    bedflow::client::print_failure(failure);
+    return static_cast<int>(failure.code);
+  } catch (const std::exception& error) {
+    bedflow::client::print_failure({bedflow::client::Exit::other, error.what()});
+    return static_cast<int>(bedflow::client::Exit::other);
+  }
+}

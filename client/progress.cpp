@@ -1,0 +1,128 @@
+#include "progress.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+namespace bedflow::client {
+
+namespace {
+
+constexpr double kSpeedWindow = 15;  // wall s
+constexpr std::chrono::milliseconds kRedraw{100};
+constexpr std::chrono::seconds kLineInterval{10};
+
+double share_done(const v1::Progress& progress) {
+  return progress.end_time() > 0 ? std::clamp(progress.time() / progress.end_time(), 0.0, 1.0) : 0;
+}
+
+std::string bar(double share, int cells, bool unicode) {
+  const auto full = static_cast<int>(share * cells);
+  std::string text;
+  for (int i = 0; i < cells; ++i) text += i < full ? (unicode ? "█" : "#") : (unicode ? "░" : "-");
+  return text;
+}
+
+std::string fixed(double value, int digits) {
+  std::array<char, 40> text{};
+  std::snprintf(text.data(), text.size(), "%.*f", digits, value);
+  return text.data();
+}
+
+// Three significant digits; never the form 1e-05 that nobody reads at a glance, down to 0.0001.
+std::string rate_text(double value) {
+  if (value <= 0 || value < 1e-4) return number_text(value);
+  const int digits = std::clamp(2 - static_cast<int>(std::floor(std::log10(value))), 0, 7);
+  return fixed(value, digits);
+}
+
+double eta(const v1::Progress& progress, const SpeedGauge& speed) {
+  if (progress.has_eta_seconds()) return progress.eta_seconds();
+  const auto rate = speed.simulated_per_wall();
+  return rate && *rate > 0 ? (progress.end_time() - progress.time()) / *rate : NAN;
+}
+
+}  // namespace
+
+void SpeedGauge::add(const v1::Progress& progress) {
+  const Point point = {progress.wall_seconds(), progress.time(), static_cast<double>(progress.step())};
+  if (!points_.empty() && (point.wall < points_.back().wall || point.step < points_.back().step)) points_.clear();  // a new attempt
+  if (!points_.empty() && point.wall == points_.back().wall) points_.pop_back();
+  points_.push_back(point);
+  while (points_.size() > 2 && points_.back().wall - points_[1].wall > kSpeedWindow) points_.pop_front();
+}
+
+std::optional<double> SpeedGauge::simulated_per_wall() const {
+  if (points_.size() < 2) return std::nullopt;
+  return (points_.back().time - points_.front().time) / (points_.back().wall - points_.front().wall);
+}
+
+std::optional<double> SpeedGauge::steps_per_second() const {
+  if (points_.size() < 2) return std::nullopt;
+  return (points_.back().step - points_.front().step) / (points_.back().wall - points_.front().wall);
+}
+
+std::string progress_line(const v1::Progress& progress, const SpeedGauge& speed, int width, bool unicode) {
+  const double share = share_done(progress);
+  const std::string percent = fixed(100 * share, 1) + " %";
+  std::vector<std::string> parts = {percent};
+  const bool settling = progress.phase() == "settling";
+  parts.push_back(std::string(settling ? "settling " : "") + "t " + fixed(progress.time(), 4) + " of " +
+                  number_text(progress.end_time()) + " s");
+  const double left = eta(progress, speed);
+  parts.push_back("ETA " + (std::isfinite(left) ? duration_text(left) : std::string("?")));
+  parts.push_back("step " + std::to_string(progress.step()));
+  if (const auto rate = speed.simulated_per_wall()) parts.push_back(rate_text(*rate) + " s/s");
+  if (const auto rate = speed.steps_per_second()) parts.push_back(rate_text(*rate) + " steps/s");
+  std::string text = parts[0];
+  std::size_t used = 1;
+  for (; used < parts.size(); ++used) {
+    if (display_width(text) + 2 + display_width(parts[used]) > static_cast<std::size_t>(width)) break;
+    text += "  " + parts[used];
+  }
+  const int room = width - static_cast<int>(display_width(text)) - 4;
+  if (used == parts.size() && room >= 8) text = "[" + bar(share, std::min(room, 30), unicode) + "] " + text;
+  return text;
+}
+
+void ProgressDisplay::update(const v1::Progress& progress) {
+  speed_.add(progress);
+  newest_ = progress;
+  newest_shown_ = false;
+  const auto wait = terminal_.interactive() ? std::chrono::milliseconds(kRedraw) : std::chrono::milliseconds(kLineInterval);
+  if (!shown_ || Clock::now() - *shown_ >= wait) draw();
+}
+
+void ProgressDisplay::draw() {
+  if (!newest_) return;
+  if (terminal_.interactive()) {
+    std::fputs(("\r\033[K" + progress_line(*newest_, speed_, terminal_.width() - 1, terminal_.unicode())).c_str(), stderr);
+    std::fflush(stderr);
+    line_open_ = true;
+  } else {
+    say(progress_line(*newest_, speed_, 110, false));
+  }
+  shown_ = Clock::now();
+  newest_shown_ = true;
+}
+
+void ProgressDisplay::message(const std::string& line) {
+  const bool redraw = line_open_;
+  clear();
+  say(line);
+  if (redraw) draw();
+}
+
+void ProgressDisplay::finish() {
+  if (newest_ && !newest_shown_) draw();
+  if (line_open_) std::fputs("\n", stderr);
+  line_open_ = false;
+}
+
+void ProgressDisplay::clear() {
+  if (line_open_) std::fputs("\r\033[K", stderr);
+  line_open_ = false;
+}
+
+}  // namespace bedflow::client

@@ -1,0 +1,34 @@
+// The command line: each file of verbs adds its own to the program.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "failure.h"
+#include "table.h"
+
+namespace bedflow::client {
+
+struct Program {
+  std::string server;             // --server, BEDFLOW_SERVER, or the default
+  std::function<Exit()> verb;     // what was asked for
+};
+
+void add_case_verbs(CLI::App& app, Program& program);    // init, validate, reference, explain
+void add_run_verb(CLI::App& app, Program& program);      // run
+void add_job_verbs(CLI::App& app, Program& program);     // submit, list, get, cancel, suspend, resume
+void add_watch_verbs(CLI::App& app, Program& program);   // watch, wait, logs
+void add_result_verbs(CLI::App& app, Program& program);  // stats, plot, render
+void add_server_verbs(CLI::App& app, Program& program);  // checkpoint, server
+
+// The verb's function is called once the whole line has been parsed.
+template <class Options>
+void on_call(CLI::App* verb, Program& program, std::shared_ptr<Options> options, Exit (*function)(const Program&, const Options&)) {
+  verb->callback([&program, options, function] { program.verb = [&program, options, function] { return function(program, *options); }; });
+}
+
+void add_format(CLI::App* verb, Format& format);
+
+}  // namespace bedflow::client
