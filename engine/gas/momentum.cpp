@@ -184,74 +184,6 @@ void Momentum::assemble_inside(int d, const double* p) {
   });
 }
 
-// The half control volume before an outflow. Beyond it there is no gradient; what comes back starts from rest.
-void Momentum::assemble_outflow(int d, int side, const double* p) {
-  const std::ptrdiff_t s = grid_.stride(d);
-  const double mu = setup_.viscosity, volume = grid_.cell_volume();
-  const double along = mu * volume / (grid_.spacing[d] * grid_.spacing[d]);
-  const double* f = flux_[d].data();
-  Equations& e = equations_[d];
-  Int3 from{0, 0, 0}, to = grid_.cells;
-  from[d] = side == 0 ? 0 : grid_.cells[d];
-  to[d] = from[d] + 1;
-  for_rows(grid_, from, to, [&](auto first, int n) {
-    for (auto c = first; c < first + n; ++c) {
-      const std::ptrdiff_t cell = side == 0 ? c : c - s;  // the one before the face
-      const double inward = side == 0 ? 0.5 * (f[c] + f[c + s]) : -0.5 * (f[c - s] + f[c]);
-      e.neighbour[2 * d + 1 - side].data()[c] = along + std::max(-inward, 0.0);
-      e.neighbour[2 * d + side].data()[c] = 0;
-      for (int t = 0; t < 3; ++t) {
-        if (t == d) continue;
-        const double across = 0.5 * mu * volume / (grid_.spacing[t] * grid_.spacing[t]);
-        const double* ft = flux_[t].data();
-        e.neighbour[2 * t].data()[c] = across + std::max(0.5 * ft[cell], 0.0);
-        e.neighbour[2 * t + 1].data()[c] = across + std::max(-0.5 * ft[cell + grid_.stride(t)], 0.0);
-      }
-      e.diagonal.data()[c] = local_[d].data()[c] + std::max(side == 0 ? f[c] : -f[c], 0.0);
-      e.source.data()[c] = constant_[d].data()[c] + push_[d].data()[c] * (p[c - s] - p[c]);
-    }
-  });
-}
-
-// Control volumes of component d along a face of the box in direction t: shear over the half cell to a wall or inflow, which
-// have their own velocity; none to a free-slip wall or an outflow. What enters through an outflow brings none.
-void Momentum::apply_boundary(int d, int t, int side) {
-  const Boundary& boundary = *boundaries_.at(t, side);
-  const bool fixed = std::holds_alternative<NoSlip>(boundary) || std::holds_alternative<Inflow>(boundary);
-  const double velocity = std::holds_alternative<NoSlip>(boundary) ? std::get<NoSlip>(boundary).velocity[d] : 0;
-  const double diffusion = setup_.viscosity * grid_.cell_volume() / (grid_.spacing[t] * grid_.spacing[t]);
-  Equations& e = equations_[d];
-  double *a = e.neighbour[2 * t + side].data(), *diagonal = e.diagonal.data(), *source = e.source.data();
-  Int3 from = low_solved(d), to = high_solved(d);
-  from[t] = side == 0 ? 0 : grid_.cells[t] - 1;
-  to[t] = from[t] + 1;
-  const auto apply = [=, this](Int3 low, Int3 high, double share) {
-    const double across = share * diffusion, shear = fixed ? 2 * across : 0;
-    for_rows(grid_, low, high, [=](auto first, int n) {
-      for (auto c = first; c < first + n; ++c) {
-        const double entering = a[c] - across;
-        diagonal[c] += shear + entering;
-        source[c] += (shear + entering) * velocity;
-        a[c] = 0;
-      }
-    });
-  };
-  Int3 inner_from = from, inner_to = to;
-  if (boundaries_.outflow(d, 0)) {
-    Int3 edge = to;
-    edge[d] = 1;
-    apply(from, edge, 0.5);
-    inner_from[d] = 1;
-  }
-  if (boundaries_.outflow(d, 1)) {
-    Int3 edge = from;
-    edge[d] = grid_.cells[d];
-    apply(edge, to, 0.5);
-    inner_to[d] = grid_.cells[d];
-  }
-  apply(inner_from, inner_to, 1);
-}
-
 // To the row above in z; none above the faces of an outflow there, which the field ends with (and whose coefficient is 0).
 std::ptrdiff_t Momentum::step_above(std::ptrdiff_t row, int n) const {
   const std::ptrdiff_t sz = grid_.stride(2);
@@ -279,7 +211,8 @@ void Momentum::relax(int d, const double* u, Sums& sums) {
           a0[c] * u[c - 1] + a1[c] * u[c + 1] + a2[c] * u[c - sy] + a3[c] * u[c + sy] + a4[c] * u[c - sz] + a5[c] * u[c + above];
       const double lack = source[c] + brought - (diagonal[c] + transport) * u[c];
       const double here = diagonal[c] * u[c] - constant[c];
-      const double acting = std::abs(source[c] - constant[c]) + std::abs(here) + transport * std::abs(u[c]);
+      const double carried = std::max(transport * std::abs(u[c]), std::abs(brought));
+      const double acting = std::abs(source[c] - constant[c]) + std::abs(here) + carried;
       const double still = diagonal[c] + keep * transport;
       const double inverse = 1 / (still + transport);
       imbalance[i] += std::abs(lack);

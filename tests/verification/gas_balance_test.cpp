@@ -180,6 +180,45 @@ TEST(Inflow, PatchAcrossCellsBringsExactlyItsFlow) {
   EXPECT_NEAR(box.simple.balance().in / exact, 1, 1e-13);  // round-off
 }
 
+// A spout of 60 m/s that starts at once draws gas back in through the outflow beside it.
+TEST(Outflow, GasThatComesBackDoesNotRunAway) {
+  GasSetup setup = upright(0);
+  std::get<Inflow>(setup.faces[1][0]).patches = {{{0.066, 0, 0.036}, {0.088, 0, 0.048}, {60, 0, 0}}};
+  GasBox box({14, 20, 7}, {0.154, 0.08, 0.084}, {false, false, false}, setup, Comm::self(), 1);
+  bool came_back = false;
+  for (int n = 0; n < 60; ++n) {
+    const GasOutcome outcome = box.step(1e-3);
+    ASSERT_TRUE(outcome.converged) << n << ": " << outcome.reason;
+    double fastest = 0;
+    for (int d = 0; d < 3; ++d)
+      for_solved(box, d, [&](int i, int j, int k) { fastest = std::max(fastest, std::abs(box.state.velocity[d](i, j, k))); });
+    EXPECT_LT(fastest, 60 * 1.05);  // nothing pushes but the spout; the step's impulsive start a little
+    const GasBalance balance = box.simple.balance();
+    EXPECT_NEAR(balance.in, balance.out, 3e-3 * balance.in);  // tolerance, counted over three directions
+    came_back = came_back || balance.in > 1.1 * 60 * 0.022 * 0.012;
+  }
+  EXPECT_TRUE(came_back);
+}
+
+// Boxes one cell deep in two directions are pipes; one cell alone is the shortest.
+TEST(GasMass, IsConservedInBoxesOneCellDeep) {
+  for (const int pipe : {0, 1, 2})
+    for (const int length : {1, 8}) {
+      GasSetup setup = still_air();
+      for (auto& faces : setup.faces) faces = {NoSlip{}, NoSlip{}};
+      setup.faces[pipe] = {Inflow{{0.5, 0, 0}, {}}, Outflow{0}};
+      Int3 cells{1, 1, 1};
+      cells[pipe] = length;
+      Vec3 size{0.01, 0.01, 0.01};
+      size[pipe] *= length;
+      GasBox box(cells, size, {false, false, false}, setup);
+      const GasOutcome outcome = box.step(1e-3);
+      ASSERT_TRUE(outcome.converged) << outcome.reason;
+      for_solved(box, pipe,
+                 [&](int i, int j, int k) { EXPECT_NEAR(box.state.velocity[pipe](i, j, k), 0.5, 1e-3); });  // tolerance
+    }
+}
+
 TEST(Hydrostatics, ClosedBoxAtRestCarriesTheWeightOfTheGas) {
   GasSetup setup = still_air();
   setup.gravity = {0, -9.81, 0};
