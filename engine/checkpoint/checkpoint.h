@@ -50,9 +50,9 @@ struct CheckpointInfo {
 
 // Collective. Writes folder/checkpoint_<step, 10 digits>.h5 by way of ….partial (file_names.h, seal.h, layout.h): layout by rank
 // 0, posix_fallocate, each rank its slabs by pwrite, fsync, manifest, fsync, verify, rename, fsync of the folder; then removes
-// the oldest beyond `keep`. Throws Stop on every rank alike: disk_full when there is no room (older checkpoints stay),
-// stale_epoch when the folder's newest attempt is above epoch (epoch 0: not checked), internal for other failures of the file
-// system.
+// the oldest beyond `keep` (at least 2), and those of later steps, which a resume from an earlier one has made void. Throws Stop
+// on every rank alike: disk_full when there is no room (older checkpoints stay), stale_epoch when the folder's newest attempt is
+// above epoch (epoch 0: not checked), internal for other failures of the file system.
 CheckpointInfo write_checkpoint(const Comm& comm, const std::filesystem::path& folder, const CheckpointContent& content, int keep,
                                 std::uint32_t epoch = 0);
 

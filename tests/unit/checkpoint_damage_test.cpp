@@ -190,15 +190,27 @@ void expect_disk_full(const Comm& comm, const fs::path& folder) {
   EXPECT_EQ(verify_checkpoint(folder / "checkpoint_0000000001.h5"), std::vector<std::string>{});
 }
 
+// A file system of 1 MiB at a folder, where that can be mounted.
+struct SmallDisk {
+  SmallDisk(const Comm& comm, const fs::path& folder) : path(folder) {
+    if (!comm.root()) return;
+    fs::create_directories(folder);
+    mounted = ::mount("tmpfs", folder.c_str(), "tmpfs", 0, "size=1m") == 0;
+  }
+  ~SmallDisk() {
+    if (mounted) ::umount(path.c_str());
+  }
+  SmallDisk(const SmallDisk&) = delete;
+  SmallDisk& operator=(const SmallDisk&) = delete;
+  fs::path path;
+  bool mounted = false;
+};
+
 TEST(FullDisk, StopsEveryRankAndKeepsTheOlderCheckpoint) {
   const Comm comm = Comm::world();
   const SharedFolder folder(comm);
-  bool mounted = false;
-  if (comm.root()) {
-    fs::create_directories(folder.checkpoints());
-    mounted = ::mount("tmpfs", folder.checkpoints().c_str(), "tmpfs", 0, "size=1m") == 0;
-  }
-  if (!comm.any(mounted)) GTEST_SKIP() << "a small file system cannot be mounted here (that takes root)";
+  const SmallDisk disk(comm, folder.checkpoints());
+  if (!comm.any(disk.mounted)) GTEST_SKIP() << "a small file system cannot be mounted here (that takes root)";
   write_checkpoint(comm, folder.checkpoints(), content_of(comm, 1), 2);
   expect_disk_full(comm, folder.checkpoints());
   comm.barrier();
@@ -213,7 +225,6 @@ TEST(FullDisk, StopsEveryRankAndKeepsTheOlderCheckpoint) {
     }
   }
   comm.barrier();
-  if (comm.root()) ::umount(folder.checkpoints().c_str());
 }
 
 TEST(FullDisk, ALimitOnFileSizesIsTheSame) {

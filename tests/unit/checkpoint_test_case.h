@@ -21,7 +21,8 @@ class SharedFolder {
   }
   ~SharedFolder() {
     comm_.barrier();
-    if (comm_.root()) std::filesystem::remove_all(path_);
+    std::error_code ignored;
+    if (comm_.root()) std::filesystem::remove_all(path_, ignored);
   }
   SharedFolder(const SharedFolder&) = delete;
   SharedFolder& operator=(const SharedFolder&) = delete;
