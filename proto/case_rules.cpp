@@ -88,7 +88,7 @@ void check_extent(const v1::Case& value, const v1::Vector& low, const v1::Vector
     faults.push_back({path + ".high." + name,
                       "is " + number_text(to) + " m, not above " + path + ".low." + name + ", " + number_text(from) + " m"});
   }
-  if (to > size * (1 + 1e-12)) {
+  if (size > 0 && to > size * (1 + 1e-12)) {
     faults.push_back({path + ".high." + name, "is " + number_text(to) + " m, outside the domain: at most domain.size." + name +
                                                   ", " + number_text(size) + " m"});
   }

@@ -80,7 +80,7 @@ class Walker {
     std::string text = "is missing: " + parameter.meaning();
     const std::string allowed = allowed_text(parameter);
     if (!allowed.empty()) {
-      text += "; set it to a value of " + allowed;
+      text += "; set it: allowed is " + allowed;
     } else if (parameter.has_unit() && parameter.unit() != "1") {
       text += "; set it, in " + parameter.unit();
     } else {
@@ -156,12 +156,14 @@ class Walker {
   void check_choice(const Message& message, const OneofDescriptor& choice, const std::string& path) {
     if (!choice_of(choice).required() || message.GetReflection()->HasOneof(message, &choice)) return;
     std::string arms;
+    int built = 0;
     for (int i = 0; i < choice.field_count(); ++i) {
       if (parameter_of(*choice.field(i)).has_not_built_yet()) continue;
-      arms += (arms.empty() ? "" : ", ") + choice.field(i)->name();
+      arms += (built++ > 0 ? ", " : "") + choice.field(i)->name();
     }
-    report(child_path(path, choice.name()),
-           "is missing: " + choice_of(choice).meaning() + "; set one of " + arms + " in " + (path.empty() ? "the case" : path));
+    report(child_path(path, choice.name()), "is missing: " + choice_of(choice).meaning() +
+                                                (built > 1 ? "; set one of " : "; set ") + arms + " in " +
+                                                (path.empty() ? "the case" : path));
   }
 };
 

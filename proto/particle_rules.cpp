@@ -141,7 +141,7 @@ void check_coincidence(const v1::Case& value, CaseFaults& faults) {
   std::vector<int> order;
   for (int i = 0; i < spheres.size(); ++i) {
     const auto p = place(i);
-    if (std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2])) order.push_back(i);
+    if (spheres[i].has_position() && std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2])) order.push_back(i);
   }
   std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return place(a) < place(b); });
   for (std::size_t k = 1; k < order.size(); ++k) {
