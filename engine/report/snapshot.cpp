@@ -1,12 +1,14 @@
 #include "report/snapshot.h"
 
+#include <limits>
+
 #include "bedflow/v1/results.pb.h"
 #include "picture.h"
 
 namespace bedflow {
 
 std::string snapshot_of(const std::filesystem::path& checkpoint, std::uint32_t most) {
-  const Picture picture = read_picture(checkpoint, most);
+  const Picture picture = read_picture(checkpoint, most > 0 ? most : std::numeric_limits<std::uint32_t>::max());
   v1::Snapshot snapshot;
   snapshot.set_step(picture.step);
   snapshot.set_time(picture.time);

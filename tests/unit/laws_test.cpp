@@ -1,0 +1,51 @@
+// The schema and the code list the same laws: an arm without a law, or a law without an arm, is named here.
+#include <gtest/gtest.h>
+
+#include <set>
+#include <string>
+
+#include "bedflow/v1/case.pb.h"
+#include "models/kernel.h"
+#include "scene.h"
+
+namespace bedflow {
+namespace {
+
+// Names of the arms of a choice that are built.
+std::set<std::string> arms(const google::protobuf::Descriptor* message, const char* choice) {
+  const google::protobuf::OneofDescriptor* oneof = message->FindOneofByName(choice);
+  EXPECT_NE(oneof, nullptr) << choice;
+  std::set<std::string> names;
+  for (int f = 0; oneof && f < oneof->field_count(); ++f) {
+    const v1::Parameter& parameter = oneof->field(f)->options().GetExtension(v1::parameter);
+    if (!parameter.has_not_built_yet()) names.insert(oneof->field(f)->name());
+  }
+  return names;
+}
+
+template <class Variant>
+struct NamesOf;
+template <class... Laws>
+struct NamesOf<std::variant<Laws...>> {
+  static std::set<std::string> get() { return {Laws::name...}; }
+};
+template <class... Laws>
+struct NamesOf<std::variant<PairAndWall<Laws>...>> {
+  static std::set<std::string> get() { return {Laws::name...}; }
+};
+
+TEST(Laws, OfTheSchemaAreThoseOfTheCode) {
+  EXPECT_EQ(arms(v1::Coupling::descriptor(), "drag"), NamesOf<Drag>::get());
+  EXPECT_EQ(arms(v1::Particles::descriptor(), "contact"), NamesOf<ContactLaw>::get());
+  EXPECT_EQ(arms(v1::Particles::descriptor(), "tangential"), NamesOf<TangentialLaw>::get());
+  EXPECT_EQ(arms(v1::Face::descriptor(), "condition"), NamesOf<Boundary>::get());
+  EXPECT_EQ(arms(v1::Monitor::descriptor(), "quantity"), NamesOf<Statistic>::get());
+  EXPECT_EQ(arms(v1::Coupling::descriptor(), "kernel"), std::set<std::string>{Hat::name});
+}
+
+TEST(Laws, AnArmThatIsNotBuiltIsNotCounted) {
+  EXPECT_FALSE(arms(v1::Particles::descriptor(), "contact").contains("hertz"));
+}
+
+}  // namespace
+}  // namespace bedflow
