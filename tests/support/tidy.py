@@ -19,14 +19,17 @@ import time
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 
-def sources(build):
-    """Our compiled sources: {path: object file}, without generated code."""
-    entries = json.loads((build / "compile_commands.json").read_text())
-    found = {}
-    for entry in entries:
+def sources(build, database):
+    """Our compiled sources: {path: object file}, without generated code. Writes their compile commands into the folder `database`,
+    without the precompiled headers, which are the compiler's own and hide what a source forgets to include."""
+    found, kept = {}, []
+    for entry in json.loads((build / "compile_commands.json").read_text()):
         path = pathlib.Path(entry["file"]).resolve()
-        if path.is_relative_to(ROOT) and not path.is_relative_to(build.resolve()):
-            found.setdefault(path, re.search(r" -o (\S+)", entry["command"]).group(1))
+        if not path.is_relative_to(ROOT) or path.is_relative_to(build.resolve()) or path in found:
+            continue
+        found[path] = re.search(r" -o (\S+)", entry["command"]).group(1)
+        kept.append(entry | {"command": re.sub(r" -include \S+cmake_pch\S+", "", entry["command"])})
+    (database / "compile_commands.json").write_text(json.dumps(kept))
     return found
 
 
@@ -39,21 +42,21 @@ def dependencies(build):
             current = found.setdefault(line.split(":")[0], [])
         elif line.strip() and current is not None:
             path = (build / line.strip()).resolve()
-            if path.is_relative_to(ROOT):
+            if path.is_relative_to(ROOT) and not path.is_relative_to(build.resolve()):
                 current.append(path)
     return found
 
 
 def stamp(source, included):
     digest = hashlib.sha256((ROOT / ".clang-tidy").read_bytes())
-    for path in [source, *sorted(included)]:
+    for path in [source, *sorted(included), *sorted((ROOT / "proto").rglob("*.proto"))]:
         digest.update(str(path).encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()
 
 
-def check(build, source):
+def check(database, source):
     started = time.monotonic()
-    result = subprocess.run(["clang-tidy", "-p", build, "--quiet", source], capture_output=True, text=True)
+    result = subprocess.run(["clang-tidy", "-p", database, "--quiet", source], capture_output=True, text=True)
     return result.returncode == 0, result.stdout, time.monotonic() - started
 
 
@@ -63,13 +66,13 @@ def main():
     clean.mkdir(parents=True, exist_ok=True)
     included = dependencies(build)
     todo = {}
-    for source, object_file in sources(build).items():
+    for source, object_file in sources(build, clean).items():
         mark = clean / stamp(source, included.get(object_file, []))
         if not mark.exists():
             todo[source] = mark
     started, faults = time.monotonic(), 0
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
-        jobs = {pool.submit(check, build, source): source for source in todo}
+        jobs = {pool.submit(check, clean, source): source for source in todo}
         for job in concurrent.futures.as_completed(jobs):
             good, text, seconds = job.result()
             source = jobs[job]
