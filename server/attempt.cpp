@@ -1,0 +1,51 @@
+#include "attempt.h"
+
+#include <system_error>
+#include <utility>
+
+#include "follow.h"
+
+namespace bedflow::server {
+
+Attempt::Attempt(JobFolder folder, std::uint32_t epoch) : folder_(std::move(folder)), epoch_(epoch), reader_(folder_.events()) {}
+
+bool Attempt::look() {
+  std::error_code missing;
+  const auto touched = std::filesystem::last_write_time(folder_.heartbeat(), missing);
+  if (!missing && touched != heartbeat_) {  // a change is told, not an age: clocks may jump
+    heartbeat_ = touched;
+    heard_ = std::chrono::steady_clock::now();
+  }
+  const auto before = last_sequence_;
+  if (!damaged_) damaged_ = !reader_.read([this](const LogRecord& record) { take(event_of(record)); });
+  return last_sequence_ != before;
+}
+
+void Attempt::take(const v1::Event& event) {
+  last_sequence_ = event.sequence();
+  if (event.has_progress()) progress_ = event.progress();
+  if (event.has_checkpoint()) checkpoint_ = event;
+  if (event.epoch() != epoch_) return;  // history, or an engine that has been replaced
+  heard_ = std::chrono::steady_clock::now();
+  if (event.has_started()) started_ = true;
+  if (event.has_stopped()) stopped_ = event.stopped();
+}
+
+Ending Attempt::ending() const {
+  if (stopped_) return {stopped_->reason(), stopped_->message()};
+  const std::string log = last_lines(folder_.error_log(epoch_));
+  const std::string said = log.empty() ? "" : "; its last words: " + log;
+  v1::ExitRecord record;
+  if (!read_message(folder_.exit_record(epoch_), record)) {
+    return {v1::RANK_DIED, "the engine and its runner ended without a word" + said};
+  }
+  const std::string code = std::to_string(record.exit_code());
+  if (record.exit_code() == 127) return {v1::BACKEND_ERROR, "the engine could not be started" + said};
+  // The disk may have been too full for the last event: then the exit code is the word.
+  if (record.exit_code() >= v1::INVALID_CASE && v1::StopReason_IsValid(record.exit_code())) {
+    return {static_cast<v1::StopReason>(record.exit_code()), "the engine ended with exit code " + code + said};
+  }
+  return {v1::RANK_DIED, "a process of the engine died (exit code " + code + ")" + said};
+}
+
+}  // namespace bedflow::server

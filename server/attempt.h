@@ -1,0 +1,56 @@
+// One attempt of a job as its folder shows it: what the engine has said, whether it still breathes, and how it ended. The same
+// for an attempt that this server started and for one that it found.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "folder.h"
+#include "record_log.h"
+
+namespace bedflow::server {
+
+struct Ending {
+  v1::StopReason reason;
+  std::string message;
+};
+
+class Attempt {
+ public:
+  Attempt(JobFolder folder, std::uint32_t epoch);
+
+  bool look();  // reads what is new; true when there is something
+
+  std::uint32_t epoch() const { return epoch_; }
+  const JobFolder& folder() const { return folder_; }
+  bool has_started() const { return started_; }
+  const std::optional<v1::Stopped>& stopped() const { return stopped_; }
+  const v1::Progress& progress() const { return progress_; }  // newest of the job
+  std::uint64_t last_sequence() const { return last_sequence_; }
+  const v1::Event& checkpoint() const { return checkpoint_; }  // the newest CheckpointWritten, whoever wrote it
+  // Since the engine's last sign of life, or since this began to look.
+  std::chrono::steady_clock::duration silence() const { return std::chrono::steady_clock::now() - heard_; }
+
+  // How it ended, once nothing of it lives: the engine's own word; else the exit record; else it was killed.
+  Ending ending() const;
+
+ private:
+  void take(const v1::Event& event);
+
+  JobFolder folder_;
+  std::uint32_t epoch_;
+  LogReader reader_;
+  bool started_ = false;
+  bool damaged_ = false;
+  std::optional<v1::Stopped> stopped_;
+  v1::Progress progress_;
+  v1::Event checkpoint_;
+  std::uint64_t last_sequence_ = 0;
+  std::filesystem::file_time_type heartbeat_{};
+  std::chrono::steady_clock::time_point heard_ = std::chrono::steady_clock::now();
+};
+
+}  // namespace bedflow::server

@@ -1,0 +1,54 @@
+// The catalogue of jobs: SQLite, write-ahead log, synchronous=FULL. What is here when a call returns is there after a crash.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "bedflow/v1/service.pb.h"
+
+struct sqlite3;
+
+namespace bedflow::server {
+
+struct JobRecord {
+  v1::Job job;
+  std::int64_t number = 0;                 // in the order of submission, from 1
+  std::uint32_t retries = 0;               // used since the job was created or resumed by a user
+  std::optional<std::uint64_t> from_step;  // checkpoint that the next attempt must take up
+};
+
+// Not thread-safe. Any failure throws std::runtime_error with SQLite's words.
+class Catalogue {
+ public:
+  explicit Catalogue(const std::filesystem::path& file);
+  ~Catalogue();
+  Catalogue(const Catalogue&) = delete;
+  Catalogue& operator=(const Catalogue&) = delete;
+
+  struct Request {
+    std::string job;
+    std::string content;  // the request, serialized deterministically
+  };
+  std::optional<Request> find_request(const std::string& request_id) const;
+  // Job and request id in one transaction; an empty request id is not kept. Gives the record its number.
+  void insert(JobRecord& record, const std::string& request_id, const std::string& content);
+  void update(const JobRecord& record);
+
+  std::optional<JobRecord> find(const std::string& id) const;
+  std::vector<JobRecord> in_states(const std::vector<v1::JobState>& states, std::int64_t most = -1) const;  // oldest first
+  // Newest first, numbers below `below`, any state if none is named.
+  std::vector<JobRecord> page(std::int64_t below, const std::vector<v1::JobState>& states, std::int64_t most) const;
+  std::int64_t count(const std::vector<v1::JobState>& states) const;
+
+ private:
+  struct Close {
+    void operator()(sqlite3* database) const;
+  };
+  std::unique_ptr<sqlite3, Close> database_;
+};
+
+}  // namespace bedflow::server

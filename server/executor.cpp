@@ -1,0 +1,92 @@
+#include "executor.h"
+
+#include <fcntl.h>
+#include <signal.h>
+#include <sys/file.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <stdexcept>
+#include <system_error>
+#include <vector>
+
+#include "process.h"
+
+namespace bedflow::server {
+namespace {
+
+class File {
+ public:
+  File(const std::filesystem::path& path, int flags) : number_(::open(path.c_str(), flags | O_CLOEXEC, 0600)) {}
+  ~File() {
+    if (number_ >= 0) ::close(number_);
+  }
+  File(const File&) = delete;
+  File& operator=(const File&) = delete;
+  int number() const { return number_; }
+
+ private:
+  int number_;
+};
+
+bool lock_is_held(const JobFolder& folder, std::uint32_t epoch) {
+  const File lock(folder.lock(epoch), O_RDONLY);
+  return lock.number() >= 0 && ::flock(lock.number(), LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+}
+
+// Processes of an attempt. Ranks outlive a killed mpirun, and with it the lock, by a second or two: they are told by the folder
+// on their command line, so that a session number that has been given to others harms nobody.
+std::vector<pid_t> members(const JobFolder& folder, std::uint32_t epoch) {
+  v1::Runner runner;
+  if (!read_message(folder.runner(epoch), runner)) return {};
+  auto found = session_members(static_cast<pid_t>(runner.pid()));
+  std::erase_if(found, [&](pid_t member) {
+    const std::string command = read_text("/proc/" + std::to_string(member) + "/cmdline");
+    return command.find(folder.root().string()) == std::string::npos;
+  });
+  return found;
+}
+
+}  // namespace
+
+void LocalExecutor::start(const JobFolder& folder, std::uint32_t epoch, std::uint32_t ranks,
+                          std::optional<std::uint64_t> from_step) {
+  for (const auto earlier : folder.epochs()) {
+    if (is_alive(folder, earlier)) throw std::runtime_error("attempt " + std::to_string(earlier) + " still runs");
+  }
+  std::filesystem::create_directories(folder.attempt(epoch));
+  sync_folder(folder.attempts());
+  const File lock(folder.lock(epoch), O_RDWR | O_CREAT);
+  const File output(folder.attempt(epoch) / "stdout.log", O_WRONLY | O_CREAT | O_APPEND);
+  const File error(folder.error_log(epoch), O_WRONLY | O_CREAT | O_APPEND);
+  if (lock.number() < 0 || output.number() < 0 || error.number() < 0) {
+    throw std::system_error(errno, std::generic_category(), "creating the files of " + folder.attempt(epoch).string());
+  }
+  if (::flock(lock.number(), LOCK_EX | LOCK_NB) != 0) throw std::runtime_error("attempt " + std::to_string(epoch) + " is taken");
+
+  std::vector<std::string> command = {programs_.server, "run-attempt",         folder.root(),       std::to_string(epoch),
+                                      "--engine",       programs_.engine,      "--mpirun",          programs_.mpirun,
+                                      "--ranks",        std::to_string(ranks), "--lock-descriptor", "3"};
+  if (from_step) command.insert(command.end(), {"--from", std::to_string(*from_step)});
+  runners_.push_back(launch({.command = command,
+                             .environment = {},
+                             .output = output.number(),
+                             .error = error.number(),
+                             .kept = lock.number(),
+                             .new_session = true}));
+}
+
+bool LocalExecutor::is_alive(const JobFolder& folder, std::uint32_t epoch) const {
+  return lock_is_held(folder, epoch) || !members(folder, epoch).empty();
+}
+
+void LocalExecutor::kill(const JobFolder& folder, std::uint32_t epoch) const {
+  for (const pid_t member : members(folder, epoch)) ::kill(member, SIGKILL);
+}
+
+void LocalExecutor::reap() {
+  std::erase_if(runners_, [](pid_t runner) { return ::waitpid(runner, nullptr, WNOHANG) == runner; });
+}
+
+}  // namespace bedflow::server

@@ -1,0 +1,136 @@
+#include "folder.h"
+
+#include <fcntl.h>
+#include <google/protobuf/text_format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <charconv>
+#include <cstdio>
+#include <fstream>
+#include <functional>
+#include <iterator>
+#include <optional>
+#include <system_error>
+
+namespace bedflow::server {
+namespace {
+
+namespace fs = std::filesystem;
+
+[[noreturn]] void fail(const std::string& doing, const fs::path& path) {
+  throw std::system_error(errno, std::generic_category(), doing + " " + path.string());
+}
+
+template <class Number>
+std::optional<Number> whole_number(std::string_view text) {
+  Number number{};
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error != std::errc() || end != text.data() + text.size() || text.empty()) return std::nullopt;
+  return number;
+}
+
+// The numbers that `take` finds in the names of a folder.
+template <class Number>
+std::vector<Number> numbers_in(const fs::path& folder, const std::function<std::optional<Number>(const std::string&)>& take) {
+  std::vector<Number> found;
+  std::error_code missing;
+  for (const auto& entry : fs::directory_iterator(folder, missing)) {
+    if (const auto number = take(entry.path().filename().string())) found.push_back(*number);
+  }
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+}  // namespace
+
+std::string JobFolder::checkpoint_name(std::uint64_t step) {
+  char name[48];
+  std::snprintf(name, sizeof name, "checkpoint_%010llu.h5", static_cast<unsigned long long>(step));
+  return name;
+}
+
+std::vector<std::uint64_t> JobFolder::checkpoint_steps() const {
+  auto steps = numbers_in<std::uint64_t>(checkpoints(), [](const std::string& name) -> std::optional<std::uint64_t> {
+    if (name.size() < 24 || !name.starts_with("checkpoint_") || !name.ends_with(".h5")) return std::nullopt;
+    return whole_number<std::uint64_t>(std::string_view(name).substr(11, name.size() - 14));
+  });
+  std::reverse(steps.begin(), steps.end());
+  return steps;
+}
+
+std::vector<std::uint32_t> JobFolder::epochs() const {
+  return numbers_in<std::uint32_t>(attempts(), [](const std::string& name) { return whole_number<std::uint32_t>(name); });
+}
+
+void JobFolder::command(v1::Control::Command command, bool skip_checkpoint) const {
+  v1::Control last;
+  read_message(control(), last);
+  v1::Control next;
+  next.set_sequence(last.sequence() + 1);
+  next.set_command(command);
+  if (skip_checkpoint) next.set_skip_checkpoint(true);
+  write_durably(control(), next);
+}
+
+void write_durably(const fs::path& path, std::string_view content) {
+  const fs::path beside = path.string() + ".new";
+  const int file = ::open(beside.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
+  if (file < 0) fail("creating", beside);
+  while (!content.empty()) {
+    const ssize_t written = ::write(file, content.data(), content.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) break;
+    content.remove_prefix(static_cast<std::size_t>(written));
+  }
+  const bool whole = content.empty() && ::fsync(file) == 0;
+  const int error = errno;
+  ::close(file);
+  if (!whole) {
+    ::unlink(beside.c_str());
+    errno = error;
+    fail("writing", beside);
+  }
+  if (::rename(beside.c_str(), path.c_str()) != 0) fail("replacing", path);
+  sync_folder(path.parent_path());
+}
+
+void write_durably(const fs::path& path, const google::protobuf::Message& message) {
+  std::string text;
+  google::protobuf::TextFormat::PrintToString(message, &text);
+  write_durably(path, text);
+}
+
+void sync_folder(const fs::path& folder) {
+  const int file = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (file < 0) fail("opening", folder);
+  const int result = ::fsync(file);
+  ::close(file);
+  if (result != 0) fail("syncing", folder);
+}
+
+bool read_message(const fs::path& path, google::protobuf::Message& message) {
+  const std::string text = read_text(path);
+  google::protobuf::TextFormat::Parser parser;
+  parser.AllowUnknownField(true);
+  return !text.empty() && parser.ParseFromString(text, &message);
+}
+
+std::string read_text(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+std::string last_lines(const fs::path& path, std::size_t bytes) {
+  std::ifstream file(path, std::ios::binary | std::ios::ate);
+  if (!file) return {};
+  const auto size = static_cast<std::size_t>(file.tellg());
+  file.seekg(static_cast<std::streamoff>(size - std::min(size, bytes)));
+  std::string text{std::istreambuf_iterator<char>(file), {}};
+  if (size > bytes) text.erase(0, text.find('\n') == std::string::npos ? 0 : text.find('\n') + 1);
+  while (!text.empty() && (text.back() == '\n' || text.back() == ' ')) text.pop_back();
+  return text;
+}
+
+}  // namespace bedflow::server

@@ -1,0 +1,393 @@
+// What clients ask of the jobs. See supervise.cpp for what happens by itself.
+#include "jobs.h"
+
+#include <google/protobuf/io/coded_stream.h>
+#include <google/protobuf/io/zero_copy_stream_impl_lite.h>
+#include <spdlog/spdlog.h>
+
+#include <charconv>
+#include <limits>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "case_file.h"
+#include "refusal.h"
+#include "security.h"
+#include "submission.h"
+
+namespace bedflow::server {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::int64_t now_nanos() {
+  return std::chrono::nanoseconds(std::chrono::system_clock::now().time_since_epoch()).count();
+}
+
+void require_job_id(const std::string& id) {
+  if (!is_job_id(id))
+    throw Refusal(Refused::bad_request, "'" + printable(id) + "' is not a job's id (j- and 12 hex digits)", "bedflow list");
+}
+
+// The same request gives the same bytes: maps in order.
+std::string content_of(v1::CreateJobRequest request) {
+  request.clear_request_id();
+  std::string bytes;
+  {
+    google::protobuf::io::StringOutputStream stream(&bytes);
+    google::protobuf::io::CodedOutputStream coded(&stream);
+    coded.SetSerializationDeterministic(true);
+    request.SerializeToCodedStream(&coded);
+  }
+  return bytes;
+}
+
+// A folder that is gone with its owner unless it is kept.
+class Draft {
+ public:
+  explicit Draft(fs::path path) : folder(std::move(path)) {
+    fs::create_directories(folder.checkpoints());
+    fs::create_directories(folder.attempts());
+  }
+  ~Draft() {
+    std::error_code ignored;
+    fs::remove_all(folder.root(), ignored);
+  }
+  Draft(const Draft&) = delete;
+  Draft& operator=(const Draft&) = delete;
+
+  const JobFolder folder;
+};
+
+std::string steps_text(const std::vector<std::uint64_t>& steps) {
+  std::string text;
+  for (const auto step : steps) text += (text.empty() ? "" : ", ") + std::to_string(step);
+  return text.empty() ? "it has none" : "it has those of step " + text;
+}
+
+std::uint64_t existing_step(const JobFolder& folder, const std::string& id, std::optional<std::uint64_t> wanted) {
+  const auto steps = folder.checkpoint_steps();
+  for (const auto step : steps) {
+    if (!wanted || step == *wanted) return step;
+  }
+  throw Refusal(
+      Refused::checkpoint_not_found,
+      "job " + id + " has no checkpoint" + (wanted ? " of step " + std::to_string(*wanted) + "; " + steps_text(steps) : ""),
+      "bedflow checkpoint list " + id);
+}
+
+}  // namespace
+
+JobRecord Jobs::record_of(const std::string& id) const {
+  require_job_id(id);
+  if (const auto live = live_.find(id); live != live_.end()) return live->second.record;
+  if (auto record = catalogue_.find(id)) return *record;
+  throw Refusal(Refused::job_not_found, "there is no job " + id, "bedflow list");
+}
+
+v1::Job Jobs::view(const JobRecord& record) const {
+  v1::Job job = record.job;
+  job.set_folder(folder_of(job.id()).root());
+  if (const auto live = live_.find(job.id()); live != live_.end()) {
+    const Attempt& attempt = live->second.attempt;
+    if (attempt.progress().ByteSizeLong() > 0) *job.mutable_progress() = attempt.progress();
+    job.set_last_sequence(attempt.last_sequence());
+  }
+  return job;
+}
+
+std::shared_ptr<StateLog> Jobs::changes_of(const std::string& id) {
+  auto& weak = changes_[id];
+  auto log = weak.lock();
+  if (!log) weak = log = std::make_shared<StateLog>();
+  return log;
+}
+
+void Jobs::store(JobRecord& record, v1::JobState state, std::optional<Ending> why) {
+  JobRecord changed = record;
+  changed.job = view(record);
+  changed.job.clear_folder();
+  changed.job.set_state(state);
+  changed.job.set_changed_unix_nanos(now_nanos());
+  changed.job.clear_reason();
+  changed.job.clear_message();
+  if (why) {
+    changed.job.set_reason(why->reason);
+    changed.job.set_message(why->message);
+  }
+  catalogue_.update(changed);
+  record = changed;
+  spdlog::info("{} is {}{}", record.job.id(), state_word(state), why ? ": " + why->message : "");
+  if (const auto watched = changes_.find(record.job.id()); watched != changes_.end()) {
+    if (const auto log = watched->second.lock()) {
+      log->add(view(record));
+    } else {
+      changes_.erase(watched);
+    }
+  }
+  news_.insert(record.job.id());
+  changed_.notify_all();
+  notifier_.poke();
+}
+
+// ------------------------------------------------------------------------------------------------------ create
+
+std::optional<v1::CreateJobResponse> Jobs::earlier_answer(const v1::CreateJobRequest& request, const std::string& content) const {
+  if (request.request_id().empty()) return std::nullopt;
+  const auto earlier = catalogue_.find_request(request.request_id());
+  if (!earlier) return std::nullopt;
+  if (earlier->content != content) {
+    throw Refusal(
+        Refused::request_id_reused,
+        "request id " + request.request_id() + " has been used for " + earlier->job + " with another case or specification",
+        "bedflow get " + earlier->job);
+  }
+  v1::CreateJobResponse response;
+  *response.mutable_job() = view(record_of(earlier->job));
+  return response;
+}
+
+void Jobs::start_from(v1::CreateJobRequest& request, JobRecord& record) const {
+  const auto& source = request.start_from();
+  record_of(source.job());
+  const auto folder = folder_of(source.job());
+  record.from_step = existing_step(folder, source.job(), source.has_step() ? std::optional(source.step()) : std::nullopt);
+  record.job.set_start_from_job(source.job());
+  record.job.set_start_from_step(*record.from_step);
+  if (!request.has_case_() && !read_message(folder.case_file(), *request.mutable_case_())) {
+    throw Refusal(Refused::backend_error, "the case of " + source.job() + " cannot be read");
+  }
+}
+
+v1::CreateJobResponse Jobs::create(const v1::CreateJobRequest& asked) {
+  const std::string content = content_of(asked);
+  v1::CreateJobRequest request = asked;
+  JobRecord record;
+  if (request.has_request_id() && !is_request_id(request.request_id())) {
+    throw Refusal(Refused::bad_request,
+                  "request_id '" + printable(request.request_id()) + "' is not of the form [A-Za-z0-9-]{8,64}");
+  }
+  {
+    const std::lock_guard guard(mutex_);
+    if (auto earlier = earlier_answer(request, content)) return *earlier;
+    if (request.has_start_from()) start_from(request, record);
+  }
+  if (!request.has_case_())
+    throw Refusal(Refused::bad_request, "the request has neither a case nor start_from", "bedflow init mueller");
+  auto faults = check_case_fields(request.case_());
+  for (auto& fault : check_spec(request.spec(), settings_.slots)) faults.push_back(std::move(fault));
+  if (!faults.empty()) {
+    throw Refusal(Refused::invalid_case,
+                  std::to_string(faults.size()) + (faults.size() == 1 ? " fault" : " faults") + " in the case",
+                  "bedflow validate CASE", std::move(faults));
+  }
+  record.job.set_id(new_job_id());
+  const Draft draft(settings_.data / "drafts" / record.job.id());
+  write_durably(draft.folder.case_file(), case_text(request.case_()));
+  v1::CreateJobResponse response;
+  *response.mutable_plan() = plan_of(settings_.programs.engine, draft.folder.case_file(), request.spec().ranks());
+  if (request.validate_only()) return response;
+  auto committed = commit(record, draft.folder, request, content);
+  *committed.mutable_plan() = response.plan();
+  return committed;
+}
+
+v1::CreateJobResponse Jobs::commit(JobRecord& record, const JobFolder& draft, const v1::CreateJobRequest& request,
+                                   const std::string& content) {
+  record.job.set_state(v1::PENDING);
+  record.job.set_case_name(request.case_().name());
+  *record.job.mutable_spec() = request.spec();
+  record.job.set_created_unix_nanos(now_nanos());
+  record.job.set_changed_unix_nanos(record.job.created_unix_nanos());
+  write_durably(draft.spec(), request.spec());
+  write_durably(draft.events(), std::string_view());  // empty: it can be watched from the start
+  if (record.from_step) {
+    const auto from = folder_of(record.job.start_from_job()).checkpoint(*record.from_step);
+    std::error_code failed;
+    fs::create_hard_link(from, draft.checkpoint(*record.from_step), failed);
+    if (failed) fs::copy_file(from, draft.checkpoint(*record.from_step));
+    sync_folder(draft.checkpoints());
+  }
+  const std::lock_guard guard(mutex_);
+  if (auto earlier = earlier_answer(request, content)) return *earlier;  // a retry has overtaken us
+  const auto folder = folder_of(record.job.id());
+  fs::rename(draft.root(), folder.root());
+  sync_folder(folder.root().parent_path());
+  catalogue_.insert(record, request.request_id(), content);
+  spdlog::info("{} is PENDING: case {}, {} ranks", record.job.id(), printable(record.job.case_name()), request.spec().ranks());
+  notifier_.poke();
+  v1::CreateJobResponse response;
+  *response.mutable_job() = view(record);
+  return response;
+}
+
+// ---------------------------------------------------------------------------------------------------- requests
+
+v1::Job Jobs::get(const std::string& id) {
+  const std::lock_guard guard(mutex_);
+  return view(record_of(id));
+}
+
+v1::ListJobsResponse Jobs::list(const v1::ListJobsRequest& request) {
+  const std::size_t size = request.has_page_size() ? request.page_size() : 50;
+  if (size < 1 || size > 1000)
+    throw Refusal(Refused::bad_request, "page_size is " + std::to_string(size) + "; allowed are 1 to 1000");
+  std::int64_t below = std::numeric_limits<std::int64_t>::max();
+  const std::string& token = request.page_token();
+  const auto [stop, error] = std::from_chars(token.data(), token.data() + token.size(), below);
+  if (!token.empty() && (error != std::errc() || stop != token.data() + token.size() || below < 1)) {
+    throw Refusal(Refused::bad_request, "page_token '" + printable(token) + "' is none that this server gave");
+  }
+  std::vector<v1::JobState> states;
+  for (const int state : request.states()) states.push_back(static_cast<v1::JobState>(state));
+  const auto has_labels = [&](const v1::Job& job) {
+    for (const auto& [key, value] : request.labels()) {
+      const auto label = job.spec().labels().find(key);
+      if (label == job.spec().labels().end() || label->second != value) return false;
+    }
+    return true;
+  };
+  const std::lock_guard guard(mutex_);
+  v1::ListJobsResponse response;
+  while (true) {
+    const auto page = catalogue_.page(below, states, static_cast<std::int64_t>(size) + 1);
+    for (const auto& record : page) {
+      if (static_cast<std::size_t>(response.jobs_size()) == size) {
+        response.set_next_page_token(std::to_string(below));
+        return response;
+      }
+      below = record.number;
+      if (has_labels(record.job)) *response.add_jobs() = view(record);
+    }
+    if (page.size() <= size) return response;
+  }
+}
+
+JobRecord& Jobs::require(JobRecord& record, Request request, const char* wanted) const {
+  if (after_request(record.job.state(), request) != v1::STATE_UNKNOWN) return record;
+  const std::string& id = record.job.id();
+  const bool may_start_again = request == Request::resume && is_final(record.job.state());
+  throw Refusal(Refused::wrong_state, "job " + id + " is " + state_word(record.job.state()) + " and cannot be " + wanted,
+                may_start_again ? "bedflow submit --from " + id : "bedflow get " + id);
+}
+
+v1::Job Jobs::request(const std::string& id, Request request, const char* wanted, v1::Control::Command command,
+                      bool skip_checkpoint) {
+  const std::lock_guard guard(mutex_);
+  JobRecord found = record_of(id);
+  require(found, request, wanted);
+  const auto live = live_.find(id);
+  JobRecord& record = live == live_.end() ? found : live->second.record;
+  const auto next = after_request(record.job.state(), request);
+  if (next == record.job.state()) return view(record);
+  if (live != live_.end()) {
+    live->second.attempt.folder().command(command, skip_checkpoint);
+    live->second.repeat_command = !live->second.attempt.has_started();
+  }
+  store(record, next);
+  not_before_.erase(id);
+  return view(record);
+}
+
+v1::Job Jobs::cancel(const std::string& id, bool skip_checkpoint) {
+  return request(id, Request::cancel, "cancelled", v1::Control::CANCEL, skip_checkpoint);
+}
+
+v1::Job Jobs::suspend(const std::string& id) {
+  return request(id, Request::suspend, "suspended", v1::Control::SUSPEND, false);
+}
+
+v1::Job Jobs::resume(const v1::ResumeJobRequest& request) {
+  const std::lock_guard guard(mutex_);
+  JobRecord record = record_of(request.id());
+  require(record, Request::resume, "resumed");
+  const auto folder = folder_of(request.id());
+  if (request.ranks() > settings_.slots) {
+    throw Refusal(Refused::bad_request, "ranks is " + std::to_string(request.ranks()) + "; this server has " +
+                                            std::to_string(settings_.slots) + " slots");
+  }
+  if (request.has_step()) {
+    record.from_step = existing_step(folder, request.id(), request.step());
+    // What is newer belongs to a history that the user has left: a later retry must not fall back to it.
+    for (const auto step : folder.checkpoint_steps()) {
+      const auto path = folder.checkpoint(step).string();
+      if (step > request.step()) fs::rename(path, path + ".superseded-" + std::to_string(record.job.epoch()));
+    }
+  }
+  if (request.ranks() > 0) {
+    record.job.mutable_spec()->set_ranks(request.ranks());
+    write_durably(folder.spec(), record.job.spec());
+  }
+  record.retries = 0;
+  store(record, v1::PENDING);
+  return view(record);
+}
+
+v1::Checkpoint Jobs::create_checkpoint(const std::string& id, std::chrono::duration<double> limit) {
+  std::unique_lock guard(mutex_);
+  JobRecord record = record_of(id);
+  require(record, Request::checkpoint, "asked for a checkpoint");
+  const auto before = live_.at(id).attempt.last_sequence();
+  live_.at(id).attempt.folder().command(v1::Control::CHECKPOINT);
+  const auto live = [&] { return live_.find(id); };
+  const bool answered = changed_.wait_for(
+      guard, limit, [&] { return live() == live_.end() || live()->second.attempt.checkpoint().sequence() > before; });
+  if (!answered) {
+    throw Refusal(Refused::timed_out, "no checkpoint of " + id + " within the time given; it will come with the next step",
+                  "bedflow checkpoint list " + id);
+  }
+  if (live() == live_.end()) {
+    throw Refusal(Refused::wrong_state, "job " + id + " ended before it wrote the checkpoint", "bedflow checkpoint list " + id);
+  }
+  const auto& written = live()->second.attempt.checkpoint().checkpoint();
+  v1::Checkpoint checkpoint;
+  checkpoint.set_job(id);
+  checkpoint.set_step(written.step());
+  checkpoint.set_time(written.time());
+  checkpoint.set_bytes(written.bytes());
+  checkpoint.set_file(written.file());
+  return checkpoint;
+}
+
+// -------------------------------------------------------------------------------------------------------- views
+
+JobFolder Jobs::folder(const std::string& id) {
+  const std::lock_guard guard(mutex_);
+  record_of(id);
+  return folder_of(id);
+}
+
+Cursor Jobs::watch(const std::string& id, std::uint64_t after, bool from_now) {
+  const std::lock_guard guard(mutex_);
+  const v1::Job job = view(record_of(id));
+  if (after > job.last_sequence()) {
+    throw Refusal(Refused::bad_request, "after_sequence is " + std::to_string(after) + "; the newest event of " + id + " is " +
+                                            std::to_string(job.last_sequence()));
+  }
+  return {folder_of(id).events(), job, changes_of(id), from_now ? job.last_sequence() : after};
+}
+
+v1::ServerInfo Jobs::info() {
+  v1::ServerInfo info;
+  info.set_version(BEDFLOW_VERSION);
+  info.add_executors("local");
+  info.set_slots(settings_.slots);
+  std::error_code failed;
+  if (const auto space = fs::space(settings_.data, failed); !failed) info.set_disk_free_bytes(space.available);
+  for (auto& law : built_laws()) info.add_built_laws(std::move(law));
+  const std::lock_guard guard(mutex_);
+  std::uint32_t ranks = 0;
+  for (const auto& [id, live] : live_) ranks += live.record.job.spec().ranks();
+  info.set_ranks_in_use(ranks);
+  info.set_jobs_running(static_cast<std::uint32_t>(live_.size()));
+  info.set_jobs_pending(static_cast<std::uint32_t>(catalogue_.count({v1::PENDING, v1::RECOVERING})));
+  return info;
+}
+
+bool Jobs::is_idle() {
+  const std::lock_guard guard(mutex_);
+  return live_.empty() && catalogue_.count({v1::PENDING, v1::RECOVERING}) == 0;
+}
+
+}  // namespace bedflow::server

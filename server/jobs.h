@@ -1,0 +1,95 @@
+// The jobs of a server: every change of state passes here. Calls come from any thread (jobs.cpp); one thread advances the
+// attempts and the queue (supervise.cpp). The catalogue says what a job is, its folder what its engine does.
+//
+// The queue is first come, first served: the oldest waiting job starts as soon as its ranks fit into the free slots.
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <string>
+
+#include "attempt.h"
+#include "catalogue.h"
+#include "executor.h"
+#include "follow.h"
+#include "states.h"
+
+namespace bedflow::server {
+
+struct Settings {
+  std::filesystem::path data;  // catalogue.sqlite, jobs/<id>/
+  Programs programs;
+  std::uint32_t slots = 4;  // ranks that may run at once
+  std::chrono::seconds heartbeat_limit{30};
+};
+
+class Jobs {
+ public:
+  explicit Jobs(Settings settings);  // takes up what earlier servers have left
+
+  // Calls. They throw Refusal.
+  v1::CreateJobResponse create(const v1::CreateJobRequest& request);
+  v1::Job get(const std::string& id);
+  v1::ListJobsResponse list(const v1::ListJobsRequest& request);
+  v1::Job cancel(const std::string& id, bool skip_checkpoint);
+  v1::Job suspend(const std::string& id);
+  v1::Job resume(const v1::ResumeJobRequest& request);
+  v1::Checkpoint create_checkpoint(const std::string& id, std::chrono::duration<double> limit);
+  v1::ServerInfo info();
+  JobFolder folder(const std::string& id);  // of a job that exists
+  Cursor watch(const std::string& id, std::uint64_t after, bool from_now);
+
+  // The supervising thread: waits for news (0.2 s at most), then takes every attempt and the queue one step on. Returns the jobs
+  // that have something new for their watchers.
+  std::set<std::string> advance();
+  void poke() { notifier_.poke(); }
+  bool is_idle();  // nothing waits, nothing runs
+
+ private:
+  struct Live {  // a job with an attempt
+    JobRecord record;
+    Attempt attempt;
+    bool adopted = false;         // found, not started by this server
+    bool repeat_command = false;  // a command came before the engine did
+    bool heartbeat_lost = false;
+    std::optional<std::chrono::steady_clock::time_point> stopped_at = {};  // when the engine said so
+  };
+
+  JobFolder folder_of(const std::string& id) const { return JobFolder(settings_.data / "jobs" / id); }
+  JobRecord record_of(const std::string& id) const;
+  v1::Job view(const JobRecord& record) const;  // with what the attempt has done since
+  std::shared_ptr<StateLog> changes_of(const std::string& id);
+  void store(JobRecord& record, v1::JobState state, std::optional<Ending> why = std::nullopt);
+  JobRecord& require(JobRecord& record, Request request, const char* wanted) const;
+  v1::Job request(const std::string& id, Request request, const char* wanted, v1::Control::Command command, bool skip_checkpoint);
+
+  std::optional<v1::CreateJobResponse> earlier_answer(const v1::CreateJobRequest& request, const std::string& content) const;
+  void start_from(v1::CreateJobRequest& request, JobRecord& record) const;
+  v1::CreateJobResponse commit(JobRecord& record, const JobFolder& draft, const v1::CreateJobRequest& request,
+                               const std::string& content);
+
+  void adopt();
+  void look_at(Live& live);
+  void end(Live& live);
+  void start_waiting();
+  void start(JobRecord record);
+
+  Settings settings_;
+  LogNotifier notifier_;
+  std::mutex mutex_;  // over all below
+  std::condition_variable changed_;
+  Catalogue catalogue_;
+  LocalExecutor executor_;
+  std::map<std::string, Live> live_;
+  std::map<std::string, std::weak_ptr<StateLog>> changes_;
+  std::map<std::string, std::chrono::steady_clock::time_point> not_before_;  // of jobs that are tried again
+  std::set<std::string> news_;
+};
+
+}  // namespace bedflow::server

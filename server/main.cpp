@@ -1,0 +1,201 @@
+// bedflowd: the server; and, as `bedflowd run-attempt`, the runner of one attempt (runner.h).
+#include <grpcpp/ext/proto_server_reflection_plugin.h>
+#include <grpcpp/grpcpp.h>
+#include <grpcpp/health_check_service_interface.h>
+#include <grpcpp/resource_quota.h>
+#include <signal.h>
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <atomic>
+#include <cstdio>
+#include <exception>
+#include <stdexcept>
+#include <string>
+#include <thread>
+
+#include "jobs.h"
+#include "runner.h"
+#include "security.h"
+#include "service.h"
+#include "watch.h"
+
+namespace bedflow::server {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace std::chrono_literals;
+
+struct Options {
+  Settings settings;
+  std::string listen;
+  bool idle_exit = false;
+  double idle_seconds = 10;
+  double bookmark_seconds = 10;
+  double heartbeat_seconds = 30;
+};
+
+// One server a data folder. Kept until the process ends.
+void take_folder(const fs::path& data) {
+  const int lock = ::open((data / "lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+  if (lock < 0) throw std::system_error(errno, std::generic_category(), (data / "lock").string());
+  if (::flock(lock, LOCK_EX | LOCK_NB) != 0) throw std::runtime_error("another bedflowd serves " + data.string());
+}
+
+std::unique_ptr<grpc::Server> listen(const std::string& address, JobService& service, int& port) {
+  grpc::EnableDefaultHealthCheckService(true);
+  grpc::reflection::InitProtoReflectionServerBuilderPlugin();
+  grpc::ServerBuilder builder;
+  builder.AddListeningPort(address, grpc::InsecureServerCredentials(), &port);
+  builder.RegisterService(&service);
+  builder.SetMaxReceiveMessageSize(32 << 20);
+  builder.SetResourceQuota(grpc::ResourceQuota("bedflowd").Resize(512 << 20));
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, 1000);
+  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, 30'000);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 20'000);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, 10'000);
+  auto server = builder.BuildAndStart();
+  if (!server) throw std::runtime_error("cannot listen on " + address);
+  return server;
+}
+
+void supervise(Jobs& jobs, Watchers& watchers, const std::atomic<bool>& ending) {
+  auto last_round = std::chrono::steady_clock::now();
+  while (!ending) {
+    try {
+      watchers.wake(jobs.advance());
+    } catch (const std::exception& failure) {  // a full disk, say: tried again in the next round
+      spdlog::error("{}", failure.what());
+      std::this_thread::sleep_for(1s);
+    }
+    if (std::chrono::steady_clock::now() - last_round < 500ms) continue;
+    last_round = std::chrono::steady_clock::now();
+    watchers.wake_all();
+  }
+}
+
+// Until a signal asks to end, or nothing has been going on for so long.
+void wait_for_end(const sigset_t& signals, const std::function<bool()>& has_nothing_to_do) {
+  const timespec moment{0, 200'000'000};
+  while (::sigtimedwait(&signals, nullptr, &moment) < 0) {
+    if (has_nothing_to_do()) return;
+  }
+}
+
+int serve(const Options& options) {
+  sigset_t signals;
+  sigemptyset(&signals);
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&signals, signal);
+  ::pthread_sigmask(SIG_BLOCK, &signals, nullptr);  // all threads inherit it
+  ::signal(SIGPIPE, SIG_IGN);
+  ::umask(0077);
+
+  const fs::path& data = options.settings.data;
+  if (options.listen.find(':') != std::string::npos && !options.listen.starts_with("unix:")) listen_address(options.listen);
+  make_private(data);
+  take_folder(data);
+  std::string address = listen_address(options.listen);
+  Jobs jobs(options.settings);
+  Watchers watchers(std::chrono::milliseconds(static_cast<int>(1000 * options.bookmark_seconds)));
+  JobService service(jobs, watchers, options.settings.programs.engine, address);
+  int port = 0;
+  const auto server = listen(address, service, port);
+  if (!address.starts_with("unix:")) address = address.substr(0, address.rfind(':') + 1) + std::to_string(port);
+  spdlog::info("bedflowd " BEDFLOW_VERSION " serves {} on {} with {} slots", data.string(), address, options.settings.slots);
+  std::printf("listening on %s\n", address.c_str());
+  std::fflush(stdout);
+
+  std::atomic<bool> ending = false;
+  std::thread supervisor([&] { supervise(jobs, watchers, ending); });
+  const std::chrono::duration<double> patience(options.idle_seconds);
+  wait_for_end(signals,
+               [&] { return options.idle_exit && service.quiet() > patience && watchers.count() == 0 && jobs.is_idle(); });
+  spdlog::info("going down; what runs goes on running");
+  watchers.drain();
+  server->Shutdown(std::chrono::system_clock::now() + 2s);
+  ending = true;
+  jobs.poke();
+  supervisor.join();
+  service.wait_for_calls();
+  return 0;
+}
+
+fs::path own_path() {
+  return fs::read_symlink("/proc/self/exe");
+}
+
+void add_server_options(CLI::App& app, Options& options) {
+  Settings& settings = options.settings;
+  settings.slots = std::max(4U, std::thread::hardware_concurrency());
+  settings.programs.server = own_path();
+  settings.programs.engine = own_path().parent_path() / "bedflow-engine";
+  app.add_option("--data", settings.data, "folder of the jobs and their catalogue; made private (mode 0700)");
+  app.add_option("--listen", options.listen, "unix:PATH or 127.0.0.1:PORT; unix:DATA/bedflowd.sock if absent");
+  app.add_option("--slots", settings.slots, "ranks that may run at once")->capture_default_str()->check(CLI::Range(1, 100'000));
+  app.add_option("--engine", settings.programs.engine, "the engine")->capture_default_str();
+  app.add_option("--mpirun", settings.programs.mpirun, "starts engines of more than one rank")->capture_default_str();
+  app.add_flag("--idle-exit", options.idle_exit, "end when no job waits or runs and no call has come for a while");
+  app.add_option("--idle-seconds", options.idle_seconds, "that while, s")->capture_default_str()->check(CLI::Range(0.1, 1e6));
+  app.add_option("--bookmark-seconds", options.bookmark_seconds, "silence after which a watcher hears a bookmark, s")
+      ->capture_default_str()
+      ->check(CLI::Range(0.1, 15.0));
+  app.add_option("--heartbeat-seconds", options.heartbeat_seconds, "silence of an engine after which it is given up, s")
+      ->capture_default_str()
+      ->check(CLI::Range(1.0, 3600.0));
+}
+
+CLI::App* add_runner(CLI::App& app, RunnerOptions& runner) {
+  auto* command = app.add_subcommand("run-attempt", "run one attempt of a job, without a server")->group("");
+  command->add_option("folder", runner.folder)->required();
+  command->add_option("epoch", runner.epoch)->required();
+  command->add_option("--engine", runner.engine)->required();
+  command->add_option("--mpirun", runner.mpirun);
+  command->add_option("--ranks", runner.ranks)->check(CLI::Range(1, 100'000));
+  command->add_option("--from", runner.from_step);
+  command->add_option("--lock-descriptor", runner.lock_descriptor);
+  return command;
+}
+
+int run(int argc, char** argv) {
+  CLI::App app("bedflowd " BEDFLOW_VERSION ": the server of bedflow. Starts engines, and never takes one down with it.");
+  app.set_version_flag("--version", BEDFLOW_VERSION);
+  Options options;
+  RunnerOptions runner;
+  add_server_options(app, options);
+  const auto* attempt = add_runner(app, runner);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  if (attempt->parsed()) return run_attempt(runner);
+  if (options.settings.data.empty())
+    throw std::invalid_argument("--data is missing: the folder of the jobs, e.g. --data ./bedflow-data");
+  options.settings.data = fs::absolute(options.settings.data).lexically_normal();
+  options.settings.heartbeat_limit = std::chrono::seconds(static_cast<int>(options.heartbeat_seconds));
+  if (options.listen.empty()) options.listen = "unix:" + (options.settings.data / "bedflowd.sock").string();
+  return serve(options);
+}
+
+}  // namespace
+}  // namespace bedflow::server
+
+int main(int argc, char** argv) {
+  spdlog::set_default_logger(spdlog::stderr_color_mt("bedflowd"));
+  spdlog::set_pattern("%Y-%m-%dT%H:%M:%S.%e%z %l %v");
+  try {
+    return bedflow::server::run(argc, argv);
+  } catch (const std::invalid_argument& wrong) {
+    std::fprintf(stderr, "bedflowd: %s\n", wrong.what());
+    return 2;
+  } catch (const std::exception& failure) {
+    std::fprintf(stderr, "bedflowd: %s\n", failure.what());
+    return 1;
+  }
+}

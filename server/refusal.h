@@ -1,0 +1,38 @@
+// Why a call is refused, free of gRPC: service.cpp makes a status of it.
+#pragma once
+
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "bedflow/v1/service.pb.h"
+
+namespace bedflow::server {
+
+enum class Refused {
+  invalid_case,          // the case, with all faults by path
+  bad_request,           // another field of the request
+  job_not_found,         //
+  checkpoint_not_found,  //
+  series_not_found,      //
+  wrong_state,           // the job's state does not allow it
+  request_id_reused,     // the same id with another content
+  timed_out,             // not within the time given
+  checkpoint_corrupt,    //
+  log_damaged,           // a record in the middle of a job's log
+  disk_full,             //
+  backend_error,         // the engine could not be asked
+};
+
+class Refusal : public std::runtime_error {
+ public:
+  Refusal(Refused why_refused, const std::string& message, std::string next_command = {}, std::vector<v1::Fault> all_faults = {})
+      : std::runtime_error(message), why(why_refused), next(std::move(next_command)), faults(std::move(all_faults)) {}
+
+  Refused why;
+  std::string next;  // the command that helps
+  std::vector<v1::Fault> faults;
+};
+
+}  // namespace bedflow::server

@@ -1,0 +1,61 @@
+// The gRPC face: translates calls to jobs, watchers and queries, and refusals to statuses. Nothing is decided here.
+#pragma once
+
+#include <grpcpp/grpcpp.h>
+
+#include <atomic>
+#include <boost/asio/thread_pool.hpp>
+#include <chrono>
+#include <filesystem>
+#include <functional>
+#include <string>
+
+#include "bedflow/v1/service.grpc.pb.h"
+#include "jobs.h"
+#include "refusal.h"
+#include "watch.h"
+
+namespace bedflow::server {
+
+// Code, message, and v1::ErrorDetail in the details. Faults beyond what gRPC's headers hold are counted, not sent.
+grpc::Status status_of(const Refusal& refusal);
+
+class JobService final : public v1::JobService::CallbackService {
+ public:
+  JobService(Jobs& jobs, Watchers& watchers, std::filesystem::path engine, std::string address)
+      : jobs_(jobs), watchers_(watchers), engine_(std::move(engine)), address_(std::move(address)) {}
+  ~JobService() override { wait_for_calls(); }
+
+  void wait_for_calls();                              // after the gRPC server's shutdown
+  std::chrono::steady_clock::duration quiet() const;  // since the last call
+
+ private:
+  using Context = grpc::CallbackServerContext;
+  using Unary = grpc::ServerUnaryReactor;
+  enum class Pace { quick, slow };  // slow: asks the engine, or waits for it
+
+  Unary* answer(Context* context, Pace pace, std::function<void()> call);
+
+  Unary* CreateJob(Context*, const v1::CreateJobRequest*, v1::CreateJobResponse*) override;
+  Unary* GetJob(Context*, const v1::GetJobRequest*, v1::Job*) override;
+  Unary* ListJobs(Context*, const v1::ListJobsRequest*, v1::ListJobsResponse*) override;
+  grpc::ServerWriteReactor<v1::WatchJobResponse>* WatchJob(Context*, const v1::WatchJobRequest*) override;
+  Unary* CancelJob(Context*, const v1::CancelJobRequest*, v1::Job*) override;
+  Unary* SuspendJob(Context*, const v1::SuspendJobRequest*, v1::Job*) override;
+  Unary* ResumeJob(Context*, const v1::ResumeJobRequest*, v1::Job*) override;
+  Unary* QueryStatistics(Context*, const v1::QueryStatisticsRequest*, v1::Statistics*) override;
+  Unary* ListCheckpoints(Context*, const v1::ListCheckpointsRequest*, v1::ListCheckpointsResponse*) override;
+  Unary* CreateCheckpoint(Context*, const v1::CreateCheckpointRequest*, v1::Checkpoint*) override;
+  Unary* GetSnapshot(Context*, const v1::GetSnapshotRequest*, v1::Snapshot*) override;
+  Unary* GetServerInfo(Context*, const v1::GetServerInfoRequest*, v1::ServerInfo*) override;
+
+  Jobs& jobs_;
+  Watchers& watchers_;
+  const std::filesystem::path engine_;
+  const std::string address_;
+  std::atomic<std::chrono::steady_clock::time_point> last_call_ = std::chrono::steady_clock::now();
+  boost::asio::thread_pool quick_{4};
+  boost::asio::thread_pool slow_{16};
+};
+
+}  // namespace bedflow::server

@@ -1,0 +1,106 @@
+#include "submission.h"
+
+#include <google/protobuf/text_format.h>
+
+#include <chrono>
+#include <cmath>
+#include <sstream>
+
+#include "case_file.h"
+#include "process.h"
+#include "refusal.h"
+#include "security.h"
+
+namespace bedflow::server {
+namespace {
+
+using namespace std::chrono_literals;
+
+class Faults {
+ public:
+  void add(const std::string& path, const std::string& text) {
+    v1::Fault fault;
+    fault.set_path(path);
+    fault.set_text(text);
+    list_.push_back(std::move(fault));
+  }
+  void number(const std::string& path, bool present, double value, double low, double high, const char* unit) {
+    if (!present || (std::isfinite(value) && value >= low && value <= high)) return;
+    std::ostringstream text;
+    text << "is " << value << " " << unit << "; allowed are " << low << " to " << high << " " << unit;
+    add(path, text.str());
+  }
+  std::vector<v1::Fault> list() && { return std::move(list_); }
+
+ private:
+  std::vector<v1::Fault> list_;
+};
+
+// A line of the engine's: "path: text".
+v1::Fault fault_of(const std::string& line) {
+  v1::Fault fault;
+  const auto colon = line.find(": ");
+  const bool has_path = colon != std::string::npos && colon > 0 && line.substr(0, colon).find(' ') == std::string::npos;
+  if (has_path) fault.set_path(line.substr(0, colon));
+  fault.set_text(has_path ? line.substr(colon + 2) : line);
+  return fault;
+}
+
+}  // namespace
+
+std::vector<v1::Fault> check_spec(const v1::JobSpec& spec, std::uint32_t slots) {
+  Faults faults;
+  faults.number("spec.ranks", true, spec.ranks(), 1, slots, "ranks (the server's slots)");
+  if (spec.executor() != "local") faults.add("spec.executor", "is '" + printable(spec.executor()) + "'; this server has: local");
+  faults.number("spec.wall_limit_seconds", spec.has_wall_limit_seconds(), spec.wall_limit_seconds(), 0, 1e9, "s");
+  faults.number("spec.retries.most", true, spec.retries().most(), 0, 100, "retries");
+  const auto& policy = spec.checkpoints();
+  constexpr double any = 1e18;
+  faults.number("spec.checkpoints.every_steps", policy.has_every_steps(), static_cast<double>(policy.every_steps()), 1, any,
+                "steps");
+  faults.number("spec.checkpoints.every_simulated_seconds", policy.has_every_simulated_seconds(),
+                policy.every_simulated_seconds(), 1e-12, 1e9, "s");
+  faults.number("spec.checkpoints.every_wall_seconds", policy.has_every_wall_seconds(), policy.every_wall_seconds(), 0.1, 1e9,
+                "s");
+  faults.number("spec.checkpoints.keep", policy.has_keep(), policy.keep(), 2, 1e6, "files");
+  if (spec.labels_size() > 64)
+    faults.add("spec.labels", "are " + std::to_string(spec.labels_size()) + "; at most 64 are allowed");
+  for (const auto& [key, value] : spec.labels()) {
+    if (!is_label_key(key))
+      faults.add("spec.labels", "key '" + printable(key) + "' is not of the form [a-z0-9][a-z0-9._/-]{0,62}");
+    if (value.size() > 255) faults.add("spec.labels", "value of '" + printable(key) + "' is longer than 255 bytes");
+  }
+  return std::move(faults).list();
+}
+
+std::vector<v1::Fault> check_case_fields(const v1::Case& value) {
+  Faults faults;
+  v1::Case known = value;
+  known.DiscardUnknownFields();
+  if (known.ByteSizeLong() != value.ByteSizeLong()) {
+    faults.add("case",
+               "carries fields or values that bedflowd " BEDFLOW_VERSION " does not know; use a client of the same version");
+  }
+  for (const auto& fault : check_case(value)) faults.add(fault.path, fault.text);
+  return std::move(faults).list();
+}
+
+v1::PlanReport plan_of(const std::filesystem::path& engine, const std::filesystem::path& case_file, std::uint32_t ranks) {
+  const auto answer = ask({engine, "--plan", case_file, "--ranks", std::to_string(ranks)}, 30s, 16 << 20);
+  if (answer.exit_code == v1::INVALID_CASE) {
+    std::vector<v1::Fault> faults;
+    std::istringstream lines(answer.error);
+    for (std::string line; std::getline(lines, line);) {
+      if (!line.empty()) faults.push_back(fault_of(line));
+    }
+    throw Refusal(Refused::invalid_case, "the engine cannot run this case", "bedflow validate CASE", std::move(faults));
+  }
+  v1::PlanReport plan;
+  if (answer.exit_code != 0 || !google::protobuf::TextFormat::ParseFromString(answer.output, &plan)) {
+    throw Refusal(Refused::backend_error, answer.timed_out ? "the engine gave no plan within 30 s"
+                                                           : "the engine gave no plan: " + printable(answer.error));
+  }
+  return plan;
+}
+
+}  // namespace bedflow::server

@@ -1,0 +1,150 @@
+// What happens to the jobs by itself: attempts are followed to their end, waiting jobs start, what an earlier server has left is
+// taken up.
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <exception>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "jobs.h"
+
+namespace bedflow::server {
+namespace {
+
+using namespace std::chrono_literals;
+using Clock = std::chrono::steady_clock;
+
+constexpr auto kPatience = 200ms;        // between two looks when nothing is told
+constexpr auto kEndPatience = 20ms;      // while an engine that has said its last word goes down
+constexpr auto kLongestEnd = 15s;        // that this may take
+constexpr std::int64_t kQueueLook = 64;  // waiting jobs that are considered in one round
+
+// The first retry comes at once, the next after 2, 4, 8 … 60 s.
+Clock::duration pause_before(std::uint32_t retry) {
+  return retry <= 1 ? 0s : std::min<std::chrono::seconds>(1s * (1 << std::min(retry - 1, 6U)), 60s);
+}
+
+}  // namespace
+
+Jobs::Jobs(Settings settings)
+    : settings_(std::move(settings)), catalogue_(settings_.data / "catalogue.sqlite"), executor_(settings_.programs) {
+  std::filesystem::create_directories(settings_.data / "jobs");
+  std::filesystem::remove_all(settings_.data / "drafts");  // submissions that were never acknowledged
+  std::filesystem::create_directories(settings_.data / "drafts");
+  adopt();
+}
+
+void Jobs::adopt() {
+  for (auto& record : catalogue_.in_states({v1::STARTING, v1::RUNNING, v1::SUSPENDING, v1::CANCELLING})) {
+    const std::string id = record.job.id();
+    const auto epoch = record.job.epoch();
+    auto& live = live_.emplace(id, Live{std::move(record), Attempt(folder_of(id), epoch)}).first->second;
+    live.adopted = true;
+    notifier_.add(live.attempt.folder().events());
+    live.attempt.look();
+    const bool alive = executor_.is_alive(live.attempt.folder(), epoch);
+    spdlog::info("{} taken up in state {}; attempt {} {}", id, state_word(live.record.job.state()), epoch,
+                 alive ? "runs" : "has ended");
+  }
+}
+
+std::set<std::string> Jobs::advance() {
+  bool ending = false;
+  {
+    const std::lock_guard guard(mutex_);
+    for (const auto& [id, live] : live_) ending = ending || live.stopped_at;
+  }
+  notifier_.wait(ending ? kEndPatience : kPatience);
+  const std::lock_guard guard(mutex_);
+  executor_.reap();
+  for (auto entry = live_.begin(); entry != live_.end();) {
+    Live& live = entry->second;
+    const bool alive = executor_.is_alive(live.attempt.folder(), live.attempt.epoch());  // before the look: nothing comes after
+    look_at(live);
+    if (!alive) end(live);
+    entry = is_attended(live.record.job.state()) ? std::next(entry) : live_.erase(entry);
+  }
+  start_waiting();
+  changed_.notify_all();
+  return std::exchange(news_, {});
+}
+
+void Jobs::look_at(Live& live) {
+  Attempt& attempt = live.attempt;
+  if (attempt.look()) news_.insert(live.record.job.id());
+  const auto state = live.record.job.state();
+  if (attempt.has_started() && state == v1::STARTING) store(live.record, v1::RUNNING);
+  if (attempt.has_started() && std::exchange(live.repeat_command, false)) {
+    v1::Control last;
+    read_message(attempt.folder().control(), last);
+    attempt.folder().command(last.command(), last.skip_checkpoint());
+  }
+  if (attempt.stopped() && !live.stopped_at) live.stopped_at = Clock::now();
+  if (live.stopped_at && Clock::now() - *live.stopped_at > kLongestEnd) executor_.kill(attempt.folder(), attempt.epoch());
+  if (!attempt.stopped() && attempt.silence() > settings_.heartbeat_limit) {
+    live.heartbeat_lost = true;
+    executor_.kill(attempt.folder(), attempt.epoch());
+  }
+}
+
+void Jobs::end(Live& live) {
+  const Attempt& attempt = live.attempt;
+  const JobFolder& folder = attempt.folder();
+  JobRecord changed = live.record;
+  Ending ending = attempt.ending();
+  if (!attempt.stopped() && live.heartbeat_lost) {
+    ending = {v1::HEARTBEAT_LOST, "no sign of life for " + std::to_string(settings_.heartbeat_limit.count()) + " s"};
+  }
+  // A server that died between its commit and the start of the runner: nobody's fault.
+  const bool never_began = live.adopted && !std::filesystem::exists(folder.runner(attempt.epoch()));
+  const bool may_retry = never_began || changed.retries < changed.job.spec().retries().most();
+  const auto next = after_attempt(changed.job.state(), ending.reason, may_retry);
+  if (attempt.has_started()) changed.from_step.reset();  // the checkpoint was good; from now on the newest is
+  if (next == v1::RECOVERING && !never_began) {
+    ++changed.retries;
+    not_before_[changed.job.id()] = Clock::now() + pause_before(changed.retries);
+  }
+  store(changed, next, ending);
+  live.record = changed;
+  notifier_.remove(folder.events());
+}
+
+void Jobs::start_waiting() {
+  std::uint32_t used = 0;
+  for (const auto& [id, live] : live_) used += live.record.job.spec().ranks();
+  for (auto& record : catalogue_.in_states({v1::PENDING, v1::RECOVERING}, kQueueLook)) {
+    const auto pause = not_before_.find(record.job.id());
+    if (pause != not_before_.end() && Clock::now() < pause->second) continue;
+    used += record.job.spec().ranks();
+    if (used > settings_.slots) return;
+    not_before_.erase(record.job.id());
+    start(std::move(record));
+  }
+}
+
+void Jobs::start(JobRecord record) {
+  const std::string id = record.job.id();
+  const auto folder = folder_of(id);
+  const auto epoch = record.job.epoch() + 1;
+  record.job.set_epoch(epoch);
+  // Committed before it happens: whatever dies now, no other attempt has this epoch.
+  store(record, v1::STARTING);
+  auto& live = live_.emplace(id, Live{std::move(record), Attempt(folder, epoch)}).first->second;
+  live.attempt.look();
+  try {
+    folder.command(v1::Control::NONE);  // commands to the attempt before are over
+    executor_.start(folder, epoch, live.record.job.spec().ranks(), live.record.from_step);
+    notifier_.add(folder.events());
+  } catch (const std::exception& failure) {
+    spdlog::error("{} cannot be started: {}", id, failure.what());
+    const bool may_retry = live.record.retries < live.record.job.spec().retries().most();
+    ++live.record.retries;
+    not_before_[id] = Clock::now() + std::max<Clock::duration>(pause_before(live.record.retries), 1s);
+    store(live.record, after_attempt(v1::STARTING, v1::BACKEND_ERROR, may_retry), Ending{v1::BACKEND_ERROR, failure.what()});
+    live_.erase(id);
+  }
+}
+
+}  // namespace bedflow::server
