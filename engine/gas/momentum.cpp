@@ -199,6 +199,13 @@ void Momentum::relax(int d, const double* u, Sums& sums) {
   const double *push = push_[d].data(), *constant = constant_[d].data(), *face = fraction_[d].data();
   const std::ptrdiff_t sy = grid_.stride(1), sz = grid_.stride(2);
   const double keep = 1 / setup_.velocity_relaxation - 1;
+  // Transport over the whole box instead of over a cell: convection by 1/n, diffusion by 1/n² for n cells.
+  const double nx = 1.0 / grid_.global[0], ny = 1.0 / grid_.global[1], nz = 1.0 / grid_.global[2];
+  double fine = 0;
+  for (int t = 0; t < 3; ++t) {
+    const double n = grid_.global[t], diffusion = setup_.viscosity * grid_.cell_volume() / (grid_.spacing[t] * grid_.spacing[t]);
+    fine += 2 * diffusion * (1 / n - 1 / (n * n));
+  }
   double* coupling = coupling_.data();
   double *imbalance = row_sums_[0].clear(), *force = row_sums_[1].clear(), *throughput = row_sums_[2].clear();
   for_rows(grid_, low_solved(d), high_solved(d), [=, this](auto first, int n) {
@@ -211,8 +218,8 @@ void Momentum::relax(int d, const double* u, Sums& sums) {
           a0[c] * u[c - 1] + a1[c] * u[c + 1] + a2[c] * u[c - sy] + a3[c] * u[c + sy] + a4[c] * u[c - sz] + a5[c] * u[c + above];
       const double lack = source[c] + brought - (diagonal[c] + transport) * u[c];
       const double here = diagonal[c] * u[c] - constant[c];
-      const double carried = std::max(transport * std::abs(u[c]), std::abs(brought));
-      const double acting = std::abs(source[c] - constant[c]) + std::abs(here) + carried;
+      const double carried = std::max(nx * (a0[c] + a1[c]) + ny * (a2[c] + a3[c]) + nz * (a4[c] + a5[c]) - fine, 0.0);
+      const double acting = std::abs(source[c] - constant[c]) + std::abs(here) + carried * std::abs(u[c]) + std::abs(lack);
       const double still = diagonal[c] + keep * transport;
       const double inverse = 1 / (still + transport);
       imbalance[i] += std::abs(lack);

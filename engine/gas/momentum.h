@@ -32,8 +32,8 @@ class Momentum {
 
   // Forces of this rank, N, summed over its faces, and the volume flow that they and the velocity stand for.
   struct Sums {
-    double imbalance = 0;   // |what the equation of the present fields lacks|
-    double force = 0;       // |pressure| + |transport| + |inertia, drag and weight together|
+    double imbalance = 0;  // |what the equation of the present fields lacks|
+    double force = 0;      // |pressure| + |ρ u²/L, μ u/L²| + |inertia, drag and weight together| + |imbalance|: knows no grid
     double throughput = 0;  // volume flow through a mean cross-section of each direction, m³/s
     double coupling = 0;    // the largest Σa over the relaxed diagonal (below 1): how strongly faces hang together; a maximum
   };

@@ -81,4 +81,40 @@ inline GasSetup still_air() {
   return setup;
 }
 
+// Upright channel: inflow below, outflow above, walls beside.
+inline GasSetup upright(double inflow) {
+  GasSetup setup = still_air();
+  setup.gravity = {0, -9.81, 0};
+  setup.faces[0] = {NoSlip{}, NoSlip{}};
+  setup.faces[1] = {Inflow{{inflow, 0, 0}, {}}, Outflow{0}};
+  return setup;
+}
+
+inline void set_fraction(GasBox& box, const std::function<double(double, double, double)>& epsilon) {
+  box.for_cells(
+      [&](int i, int j, int k) { box.state.fraction(i, j, k) = epsilon(box.centre(0, i), box.centre(1, j), box.centre(2, k)); });
+}
+
+inline void for_solved(const GasBox& box, int d, const std::function<void(int, int, int)>& act) {
+  const Simple::Range range = box.simple.solved_faces(d);
+  Int3 low{0, 0, 0}, high = box.grid.cells;
+  low[d] = range.low;
+  high[d] = range.high + 1;
+  for (int k = low[2]; k < high[2]; ++k)
+    for (int j = low[1]; j < high[1]; ++j)
+      for (int i = low[0]; i < high[0]; ++i) act(i, j, k);
+}
+
+// A bed of given drag density (kg/m³s) and solids fraction in the whole box, the same on every control volume; moving at `speed`.
+inline void fill_exchange(GasBox& box, double drag, double solids, Vec3 speed = {}) {
+  for (int d = 0; d < 3; ++d)
+    for_solved(box, d, [&, d](int i, int j, int k) {
+      const int at[3] = {i, j, k};
+      const bool half = at[d] == box.grid.cells[d] && box.simple.solved_faces(d).high == at[d];
+      box.exchange.drag[d](i, j, k) = drag * box.grid.cell_volume() * (half ? 0.5 : 1);
+      box.exchange.drag_momentum[d](i, j, k) = box.exchange.drag[d](i, j, k) * speed[d];
+      box.exchange.buoyancy[d](i, j, k) = solids;
+    });
+}
+
 }  // namespace bedflow

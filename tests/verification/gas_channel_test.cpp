@@ -98,5 +98,22 @@ TEST(Poiseuille, BetweenInflowAndOutflowTheProfileDevelopsIntoTheParabola) {
   EXPECT_NEAR(std::log2(coarse / fine), 2, 0.1);  // second order, with a trace of upwind
 }
 
+// One direction, no inertia: the normal stress 2μ u' − (2/3)μ u' balances the pressure, p − (4/3)μ u' is the same in all cells.
+TEST(Viscosity, NormalStressOfADilatingFlowIsFourThirds) {
+  GasSetup setup = still_air();
+  setup.density = 1e-9;
+  setup.viscosity = 1;
+  setup.faces[0] = {Inflow{{0.5, 0, 0}, {}}, Outflow{0}};
+  setup.tolerance = 1e-10;
+  GasBox box({24, 2, 2}, {0.24, 0.02, 0.02}, {false, true, true}, setup);
+  box.for_cells([&](int i, int j, int k) { box.state.fraction(i, j, k) = 0.7 + 0.2 * std::sin(30 * box.centre(0, i)); });
+  ASSERT_TRUE(box.step(1).converged);
+  const auto stress = [&](int i) {
+    return 4.0 / 3 * (box.state.velocity[0](i + 1, 0, 0) - box.state.velocity[0](i, 0, 0)) / 0.01;
+  };
+  for (int i = 1; i < 24; ++i)
+    EXPECT_NEAR(box.state.pressure(i, 0, 0) - stress(i), box.state.pressure(0, 0, 0) - stress(0), 1e-5) << i;  // of 30: tolerance
+}
+
 }  // namespace
 }  // namespace bedflow
