@@ -43,12 +43,12 @@ struct Particle {
 template <class Law>
 class Scene {
  public:
-  Scene(const Comm& comm, Vec3 size, const Spheres& spheres, Int3 cells = {8, 8, 8})
+  Scene(const Comm& comm, Vec3 size, const Spheres& spheres, Int3 cells = {8, 8, 8}, bool gas = false)
       : spheres_(spheres),
         decomposition_(
             comm, cells, size,
             {spheres.sides[0] == Side::periodic, spheres.sides[1] == Side::periodic, spheres.sides[2] == Side::periodic}),
-        dem(decomposition_, setup(spheres), timer) {}
+        dem(decomposition_, setup(spheres, gas), timer) {}
 
   void place(const std::vector<PlacedSphere>& spheres) { take(seed_placed(decomposition_, spheres)); }
   void seed(const RandomSeeds& seeds) { take(seed_random(decomposition_, spheres_.diameter / 2, seeds)); }
@@ -72,7 +72,7 @@ class Scene {
   }
 
  private:
-  static DemSetup setup(const Spheres& spheres) {
+  static DemSetup setup(const Spheres& spheres, bool gas) {
     DemSetup result;
     result.radius = spheres.diameter / 2;
     result.mass = spheres.mass();
@@ -80,6 +80,7 @@ class Scene {
     result.skin = spheres.skin;
     result.rotation = Law::rotation;
     result.history = Law::history;
+    result.gas = gas;
     for (int d = 0; d < 3; ++d) result.sides[d] = {spheres.sides[d], spheres.sides[d]};
     return result;
   }
