@@ -16,12 +16,12 @@
 namespace bedflow {
 namespace {
 
-constexpr std::size_t kMostFaults = 200;  // a list beyond that helps nobody, and must fit into a status
+constexpr std::size_t most_faults = 200;  // a list beyond that helps nobody, and must fit into a status
 
 void shorten(std::vector<CaseFault>& faults) {
-  if (faults.size() <= kMostFaults) return;
-  const std::size_t more = faults.size() - kMostFaults;
-  faults.resize(kMostFaults);
+  if (faults.size() <= most_faults) return;
+  const std::size_t more = faults.size() - most_faults;
+  faults.resize(most_faults);
   faults.push_back({"case", "has " + std::to_string(more) + " more faults: correct these first"});
 }
 

@@ -16,9 +16,9 @@ namespace {
 using google::protobuf::Descriptor;
 using google::protobuf::FieldDescriptor;
 
-constexpr int kDeepest = 50;               // blocks within blocks; the schema's own depth is below ten
-constexpr std::size_t kLongestName = 64;   // of a field that does not exist, for the search of similar ones
-constexpr std::size_t kLongestText = 300;  // of a parser's own message
+constexpr int deepest_nesting = 50;        // blocks within blocks; the schema's own depth is below ten
+constexpr std::size_t longest_name = 64;   // of a field that does not exist, for the search of similar ones
+constexpr std::size_t longest_text = 300;  // of a parser's own message
 
 // Deep nesting exhausts the parsers' stack, so it is refused first. `line_ends_string`: as in the text format.
 bool is_too_deep(const std::string& text, bool line_ends_string) {
@@ -34,7 +34,7 @@ bool is_too_deep(const std::string& text, bool line_ends_string) {
     } else if (c == '#' && line_ends_string) {
       i = std::min(text.find('\n', i), text.size());
     } else if (c == '{' || c == '[' || c == '<') {
-      if (++depth > kDeepest) return true;
+      if (++depth > deepest_nesting) return true;
     } else if (c == '}' || c == ']' || c == '>') {
       depth = std::max(depth - 1, 0);
     }
@@ -43,7 +43,7 @@ bool is_too_deep(const std::string& text, bool line_ends_string) {
 }
 
 CaseFault too_deep() {
-  return {"text", "has more than " + std::to_string(kDeepest) + " blocks within blocks: no case needs that"};
+  return {"text", "has more than " + std::to_string(deepest_nesting) + " blocks within blocks: no case needs that"};
 }
 
 // Insertions, deletions and replacements between two names (Levenshtein).
@@ -74,7 +74,7 @@ std::string advice(const Descriptor& type, const std::string& name) {
   for (int i = 0; i < type.field_count(); ++i) {
     const std::string& known = type.field(i)->name();
     all.push_back(known);
-    if (name.size() <= kLongestName && distance(name, known) <= std::max<std::size_t>(1, known.size() / 3)) near.push_back(known);
+    if (name.size() <= longest_name && distance(name, known) <= std::max<std::size_t>(1, known.size() / 3)) near.push_back(known);
   }
   for (int i = 0; i < type.file()->message_type_count(); ++i) {
     const Descriptor& other = *type.file()->message_type(i);
@@ -94,7 +94,7 @@ std::string advice(const Descriptor& type, const std::string& name) {
 }
 
 std::string shortened(const std::string& text) {
-  return text.size() <= kLongestText ? text : text.substr(0, kLongestText) + "…";
+  return text.size() <= longest_text ? text : text.substr(0, longest_text) + "…";
 }
 
 std::string unknown_field(const Descriptor& type, const std::string& name) {

@@ -51,9 +51,9 @@ void check_cells_against_diameter(const v1::Case& value, CaseFaults& faults) {
     if (!(length > 0) || !(edge < diameter / 2)) continue;
     const double most = std::floor(2 * length / diameter);
     faults.push_back(
-        {"domain.cells." + std::string(kAxes[axis]),
+        {"domain.cells." + std::string(axis_names[axis]),
          "makes cells of " + number_text(edge) + " m, but the kernel coupling.hat needs at least half of " + d + "; " +
-             (most >= 1 ? "use at most " + number_text(most) : "make domain.size." + std::string(kAxes[axis]) + " larger")});
+             (most >= 1 ? "use at most " + number_text(most) : "make domain.size." + std::string(axis_names[axis]) + " larger")});
   }
   const double ratio = std::cbrt(volume) / diameter;
   if (!(volume > 0) || !(ratio < 1)) return;
@@ -83,7 +83,7 @@ void check_extent(const v1::Case& value, const v1::Vector& low, const v1::Vector
   const double from = component(low, axis);
   const double to = component(high, axis);
   const double size = component(value.domain().size(), axis);
-  const std::string name = kAxes[axis];
+  const std::string name = axis_names[axis];
   if (from >= to) {
     faults.push_back({path + ".high." + name,
                       "is " + number_text(to) + " m, not above " + path + ".low." + name + ", " + number_text(from) + " m"});

@@ -17,7 +17,7 @@ void check_faces(const v1::Case& value, CaseFaults& faults);      // periodic di
 void check_particles(const v1::Case& value, CaseFaults& faults);  // where they are at time 0, contacts' reach
 void check_monitors(const v1::Case& value, CaseFaults& faults);   // monitors and the references that belong to them
 
-constexpr std::array<const char*, 3> kAxes{"x", "y", "z"};
+constexpr std::array<const char*, 3> axis_names{"x", "y", "z"};
 
 // Components by axis, 0 to 2, of Vector, Lengths, Cells and Directions.
 template <typename Components>

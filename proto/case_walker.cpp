@@ -14,7 +14,7 @@ using google::protobuf::Message;
 using google::protobuf::OneofDescriptor;
 using google::protobuf::Reflection;
 
-constexpr std::size_t kLongestQuote = 80;  // of a user's text within a fault
+constexpr std::size_t longest_quote = 80;  // of a user's text within a fault
 
 // Whether the bytes are UTF-8 as RFC 3629 has it, without control characters other than line ends and tabs.
 bool is_plain_text(const std::string& text) {
@@ -146,7 +146,7 @@ class Walker {
     if (!is_plain_text(value)) {
       report(path, "has bytes that are not text in UTF-8, or control characters: remove them");
     } else if (parameter.has_pattern() && !std::regex_match(value, std::regex(parameter.pattern()))) {
-      const std::string quote = value.size() > kLongestQuote ? value.substr(0, kLongestQuote) + "…" : value;
+      const std::string quote = value.size() > longest_quote ? value.substr(0, longest_quote) + "…" : value;
       report(path, "is \"" + quote + "\": it must match " + parameter.pattern() + " (" + parameter.meaning() + ")");
     } else if (parameter.required() && value.empty()) {
       report_missing(path, parameter);

@@ -19,7 +19,7 @@ void for_each_face(const v1::Case& value, Rule rule) {
 void check_wall(const v1::Face& face, const std::string& path, std::size_t axis, CaseFaults& faults) {
   const double normal = component(face.no_slip_wall().velocity(), axis);
   if (face.has_no_slip_wall() && normal != 0) {
-    faults.push_back({path + ".no_slip_wall.velocity." + kAxes[axis],
+    faults.push_back({path + ".no_slip_wall.velocity." + axis_names[axis],
                       "is " + number_text(normal) + " m/s, normal to the face: a wall of the box can slide only; set it to 0"});
   }
 }
@@ -47,7 +47,8 @@ void check_faces(const v1::Case& value, CaseFaults& faults) {
   bool has_outflow = false;
   for_each_face(value, [&](const v1::Face& face, const std::string& path, std::size_t axis) {
     if (component(value.domain().periodic(), axis)) {
-      faults.push_back({path, "is set, but domain.periodic." + std::string(kAxes[axis]) + " is true: remove one of the two"});
+      faults.push_back(
+          {path, "is set, but domain.periodic." + std::string(axis_names[axis]) + " is true: remove one of the two"});
     }
     check_wall(face, path, axis, faults);
     check_patches(value, face, path, axis, faults);

@@ -46,8 +46,8 @@ std::string quantity_name(const v1::Monitor& monitor) {
 void check_inside(const v1::Case& value, double coordinate, std::size_t axis, const std::string& path, CaseFaults& faults) {
   const double size = component(value.domain().size(), axis);
   if (!(coordinate > size)) return;
-  faults.push_back({path, "is " + number_text(coordinate) + " m, outside the domain: at most domain.size." + kAxes[axis] + ", " +
-                              number_text(size) + " m"});
+  faults.push_back({path, "is " + number_text(coordinate) + " m, outside the domain: at most domain.size." + axis_names[axis] +
+                              ", " + number_text(size) + " m"});
 }
 
 void check_pressure_drop(const v1::Case& value, const v1::PressureDrop& drop, const std::string& path, CaseFaults& faults) {

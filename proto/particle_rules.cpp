@@ -10,9 +10,9 @@ namespace bedflow {
 namespace {
 
 // Random placing without overlap: beyond this solids fraction it takes too many tries (saturation is near 0.38).
-constexpr double kDensestRandomFraction = 0.35;
+constexpr double densest_random_fraction = 0.35;
 // The closest that neighbours of a lattice may be, in diameters: a slight overlap is a preloaded packing, more is a mistake.
-constexpr double kClosestLattice = 0.9;
+constexpr double closest_lattice = 0.9;
 
 double edge_of(const v1::Box& box, std::size_t axis) {
   return component(box.high(), axis) - component(box.low(), axis);
@@ -32,7 +32,7 @@ void check_diameter(const v1::Case& value, CaseFaults& faults) {
     const double size = component(value.domain().size(), axis);
     if (!(size > 0) || !(diameter > size)) continue;
     faults.push_back({"particles.diameter", "is " + number_text(diameter) + " m, larger than the domain: at most domain.size." +
-                                                kAxes[axis] + ", " + number_text(size) + " m"});
+                                                axis_names[axis] + ", " + number_text(size) + " m"});
   }
 }
 
@@ -54,9 +54,9 @@ void check_region(const v1::Case& value, const v1::Box& region, const std::strin
     check_extent(value, region.low(), region.high(), axis, path, faults);
     const double edge = edge_of(region, axis);
     if (edge > 0 && edge < diameter) {
-      faults.push_back({path + ".high." + kAxes[axis], "leaves the region " + number_text(edge) + " m along " + kAxes[axis] +
-                                                           ": at least particles.diameter, " + number_text(diameter) +
-                                                           " m, is needed"});
+      faults.push_back({path + ".high." + axis_names[axis], "leaves the region " + number_text(edge) + " m along " +
+                                                                axis_names[axis] + ": at least particles.diameter, " +
+                                                                number_text(diameter) + " m, is needed"});
     }
   }
 }
@@ -66,12 +66,12 @@ void check_random_count(const v1::Case& value, const v1::Box& region, CaseFaults
   const double volume = edge_of(region, 0) * edge_of(region, 1) * edge_of(region, 2);
   const double sphere = std::numbers::pi / 6 * d * d * d;
   const double fraction = value.particles().random().count() * sphere / volume;
-  if (!(volume > 0) || !(d > 0) || !(fraction > kDensestRandomFraction)) return;
+  if (!(volume > 0) || !(d > 0) || !(fraction > densest_random_fraction)) return;
   faults.push_back({"particles.random.count", "is " + std::to_string(value.particles().random().count()) +
                                                   ", a solids fraction of " + number_text(std::round(fraction * 1e3) / 1e3) +
                                                   " in particles.random.region: random placing reaches " +
-                                                  number_text(kDensestRandomFraction) + ", which is " +
-                                                  number_text(std::floor(kDensestRandomFraction * volume / sphere)) +
+                                                  number_text(densest_random_fraction) + ", which is " +
+                                                  number_text(std::floor(densest_random_fraction * volume / sphere)) +
                                                   " particles; make the region higher, or place fewer"});
 }
 
@@ -83,8 +83,8 @@ void check_settling(const v1::Case& value, CaseFaults& faults) {
     const double g = component(value.gravity(), axis);
     pulls = pulls || g != 0;
     if (g != 0 && component(value.domain().periodic(), axis)) {
-      faults.push_back({path, "never ends: gravity." + std::string(kAxes[axis]) + " is " + number_text(g) +
-                                  " m/s² and domain.periodic." + kAxes[axis] + " is true, so the particles fall for ever"});
+      faults.push_back({path, "never ends: gravity." + std::string(axis_names[axis]) + " is " + number_text(g) +
+                                  " m/s² and domain.periodic." + axis_names[axis] + " is true, so the particles fall for ever"});
     }
   }
   if (!pulls) faults.push_back({path, "needs gravity, but gravity is 0: remove settling or set gravity"});
@@ -105,10 +105,10 @@ void check_lattice(const v1::Case& value, CaseFaults& faults) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const std::uint32_t count = component(lattice.count(), axis);
     const double edge = edge_of(region, axis);
-    if (count < 2 || !(edge > 0) || !(edge / count < kClosestLattice * diameter)) continue;
-    faults.push_back({"particles.lattice.count." + std::string(kAxes[axis]),
+    if (count < 2 || !(edge > 0) || !(edge / count < closest_lattice * diameter)) continue;
+    faults.push_back({"particles.lattice.count." + std::string(axis_names[axis]),
                       "is " + std::to_string(count) + ", a spacing of " + number_text(edge / count) + " m: at least " +
-                          number_text(kClosestLattice) + " of particles.diameter, " + number_text(diameter) +
+                          number_text(closest_lattice) + " of particles.diameter, " + number_text(diameter) +
                           " m, is needed; use at most " + number_text(std::floor(edge / diameter * (1 + 1e-9)))});
   }
 }
@@ -124,9 +124,9 @@ void check_centres(const v1::Case& value, CaseFaults& faults) {
       const double x = component(spheres[i].position(), axis);
       const double size = component(value.domain().size(), axis);
       if (!(x > size)) continue;
-      faults.push_back({sphere_path(i) + "." + kAxes[axis], "is " + number_text(x) +
-                                                                " m, outside the domain: at most domain.size." + kAxes[axis] +
-                                                                ", " + number_text(size) + " m"});
+      faults.push_back({sphere_path(i) + "." + axis_names[axis], "is " + number_text(x) +
+                                                                     " m, outside the domain: at most domain.size." +
+                                                                     axis_names[axis] + ", " + number_text(size) + " m"});
     }
   }
 }

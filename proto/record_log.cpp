@@ -19,9 +19,9 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "logs are little-endian");
 
-constexpr std::size_t kHeaderBytes = 20;
-constexpr std::size_t kChunkBytes = 1 << 20;
-constexpr std::size_t kMostPayloadBytes = 1 << 28;
+constexpr std::size_t header_bytes = 20;
+constexpr std::size_t chunk_bytes = 1 << 20;
+constexpr std::size_t most_payload_bytes = 1 << 28;
 
 [[noreturn]] void fail(int error, const std::string& doing, const std::filesystem::path& path) {
   throw std::system_error(error, std::generic_category(), doing + " " + path.string());
@@ -35,12 +35,12 @@ T number_at(std::string_view bytes, std::size_t place) {
 }
 
 std::string frame(std::uint32_t type, std::uint64_t sequence, std::string_view payload) {
-  std::string bytes(kHeaderBytes + payload.size(), '\0');
+  std::string bytes(header_bytes + payload.size(), '\0');
   const auto length = static_cast<std::uint32_t>(payload.size());
   std::memcpy(bytes.data(), &length, 4);
   std::memcpy(bytes.data() + 4, &type, 4);
   std::memcpy(bytes.data() + 8, &sequence, 8);
-  std::copy(payload.begin(), payload.end(), bytes.begin() + kHeaderBytes);
+  std::copy(payload.begin(), payload.end(), bytes.begin() + header_bytes);
   const std::uint32_t sum = crc32c(payload, crc32c(std::string_view(bytes).substr(4, 12)));
   std::memcpy(bytes.data() + 16, &sum, 4);
   return bytes;
@@ -48,23 +48,23 @@ std::string frame(std::uint32_t type, std::uint64_t sequence, std::string_view p
 
 // Bytes of the whole record that starts here by its length field; nothing when even the header is cut.
 std::optional<std::size_t> record_bytes(std::string_view bytes) {
-  if (bytes.size() < kHeaderBytes) return std::nullopt;
-  return kHeaderBytes + number_at<std::uint32_t>(bytes, 0);
+  if (bytes.size() < header_bytes) return std::nullopt;
+  return header_bytes + number_at<std::uint32_t>(bytes, 0);
 }
 
 bool is_sound(std::string_view bytes) {
   const auto size = record_bytes(bytes);
   if (!size || *size > bytes.size()) return false;
-  const std::string_view payload = bytes.substr(kHeaderBytes, *size - kHeaderBytes);
+  const std::string_view payload = bytes.substr(header_bytes, *size - header_bytes);
   return number_at<std::uint32_t>(bytes, 16) == crc32c(payload, crc32c(bytes.substr(4, 12)));
 }
 
 // Whether a sound, later record follows the damage at the start of `bytes`: then the damage is not a torn end.
 bool later_record_follows(std::string_view bytes, std::uint64_t expected) {
-  for (std::size_t place = 1; place + kHeaderBytes <= bytes.size(); ++place) {
+  for (std::size_t place = 1; place + header_bytes <= bytes.size(); ++place) {
     const std::string_view rest = bytes.substr(place);
     const auto sequence = number_at<std::uint64_t>(rest, 8);
-    if (sequence > expected && sequence - expected < kMostPayloadBytes && is_sound(rest)) return true;
+    if (sequence > expected && sequence - expected < most_payload_bytes && is_sound(rest)) return true;
   }
   return false;
 }
@@ -134,7 +134,7 @@ LogWriter::~LogWriter() {
 }
 
 std::uint64_t LogWriter::append(std::uint32_t type, std::string_view payload) {
-  if (payload.size() > kMostPayloadBytes) fail(EMSGSIZE, "appending to", path_);
+  if (payload.size() > most_payload_bytes) fail(EMSGSIZE, "appending to", path_);
   const std::string bytes = frame(type, next_sequence_, payload);
   std::size_t written = 0;
   while (written < bytes.size()) {
@@ -164,14 +164,14 @@ bool LogReader::read_up_to(std::size_t most, const std::function<void(const LogR
     fail(errno, "opening", path_);
   }
   std::size_t taken = 0;
-  for (std::size_t chunk = kChunkBytes;;) {
+  for (std::size_t chunk = chunk_bytes;;) {
     const std::string bytes = bytes_at(file.get(), offset_, chunk, path_);
     std::string_view rest = bytes;
     while (is_sound(rest) && number_at<std::uint64_t>(rest, 8) == next_sequence_) {
       if (taken++ == most) return true;
       const std::size_t size = *record_bytes(rest);
       LogRecord record{number_at<std::uint32_t>(rest, 4), next_sequence_,
-                       std::string(rest.substr(kHeaderBytes, size - kHeaderBytes))};
+                       std::string(rest.substr(header_bytes, size - header_bytes))};
       offset_ += size;
       ++next_sequence_;
       rest.remove_prefix(size);
@@ -179,12 +179,13 @@ bool LogReader::read_up_to(std::size_t most, const std::function<void(const LogR
     }
     if (rest.empty() && bytes.size() < chunk) return true;
     const auto size = record_bytes(rest);
-    const bool may_go_on = bytes.size() == chunk && (!size || (*size > rest.size() && *size <= kHeaderBytes + kMostPayloadBytes));
+    const bool may_go_on =
+        bytes.size() == chunk && (!size || (*size > rest.size() && *size <= header_bytes + most_payload_bytes));
     if (!may_go_on) {                    // torn or damaged
       if (is_sound(rest)) return false;  // whole, but with a number out of turn
-      return !later_record_follows(bytes_at(file.get(), offset_, kMostPayloadBytes, path_), next_sequence_);
+      return !later_record_follows(bytes_at(file.get(), offset_, most_payload_bytes, path_), next_sequence_);
     }
-    chunk = std::max(kChunkBytes, size.value_or(0));
+    chunk = std::max(chunk_bytes, size.value_or(0));
   }
 }
 

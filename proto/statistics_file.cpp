@@ -105,10 +105,10 @@ v1::Estimate estimate_at(const Monitor& monitor, int place, Field field) {
   return estimate(values);
 }
 
-constexpr auto kMean = [](const v1::BinClosed& bin) -> const auto& {
+constexpr auto mean_of = [](const v1::BinClosed& bin) -> const auto& {
   return bin.mean();
 };
-constexpr auto kDeviation = [](const v1::BinClosed& bin) -> const auto& {
+constexpr auto deviation_of = [](const v1::BinClosed& bin) -> const auto& {
   return bin.deviation();
 };
 
@@ -123,8 +123,8 @@ v1::Series series_of(const v1::MonitorSchema& schema, const Monitor& monitor, co
     series.add_value(sample.value);
   }
   if (schema.averaging_bin() > 0) {
-    *series.mutable_average() = estimate_at(monitor, 0, kMean);
-    *series.mutable_deviation() = estimate_at(monitor, 0, kDeviation);
+    *series.mutable_average() = estimate_at(monitor, 0, mean_of);
+    *series.mutable_deviation() = estimate_at(monitor, 0, deviation_of);
   }
   return series;
 }
@@ -136,8 +136,8 @@ v1::Profile profile_of(const v1::MonitorSchema& schema, const Monitor& monitor) 
   profile.set_meaning(schema.meaning());
   *profile.mutable_place() = schema.places();
   for (int place = 0; place < schema.places_size(); ++place) {
-    *profile.add_average() = estimate_at(monitor, place, kMean);
-    *profile.add_deviation() = estimate_at(monitor, place, kDeviation);
+    *profile.add_average() = estimate_at(monitor, place, mean_of);
+    *profile.add_deviation() = estimate_at(monitor, place, deviation_of);
   }
   return profile;
 }

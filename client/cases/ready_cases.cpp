@@ -18,7 +18,7 @@ struct ShortName {
   std::string_view meant;
   std::string_view description;
 };
-constexpr std::array<ShortName, 3> kShortNames{{{"goldschmidt", "goldschmidt-1.5", "short for goldschmidt-1.5"},
+constexpr std::array<ShortName, 3> short_names{{{"goldschmidt", "goldschmidt-1.5", "short for goldschmidt-1.5"},
                                                 {"link", "link-b2", "short for link-b2"},
                                                 {"sscp", "sscp-3", "short for sscp-3"}}};
 
@@ -86,7 +86,7 @@ void lay_over(v1::Case preset, v1::Case& value) {
 
 std::vector<ReadyCase> ready_cases() {
   std::vector<ReadyCase> list = listed(case_texts());
-  for (const ShortName& one : kShortNames) list.push_back({one.name, one.description});
+  for (const ShortName& one : short_names) list.push_back({one.name, one.description});
   return list;
 }
 
@@ -95,7 +95,7 @@ std::vector<ReadyCase> ready_presets() {
 }
 
 std::string ready_case_text(std::string_view name) {
-  for (const ShortName& one : kShortNames) {
+  for (const ShortName& one : short_names) {
     if (one.name == name) name = one.meant;
   }
   return text_of(case_texts(), name, "ready case");

@@ -10,6 +10,7 @@
 
 #include "case_file.h"
 #include "cases/ready_cases.h"
+#include "support/case_faults.h"
 
 namespace bedflow {
 
@@ -26,8 +27,8 @@ using testing::IsEmpty;
 using testing::StartsWith;
 using testing::UnorderedElementsAreArray;
 
-const std::vector<std::string> kBeds{"goldschmidt-1.25", "goldschmidt-1.5", "goldschmidt-2", "mueller", "link-b1",
-                                     "link-b2",          "link-b3",         "sscp-2",        "sscp-3",  "sscp-4"};
+const std::vector<std::string> beds{"goldschmidt-1.25", "goldschmidt-1.5", "goldschmidt-2", "mueller", "link-b1",
+                                    "link-b2",          "link-b3",         "sscp-2",        "sscp-3",  "sscp-4"};
 
 double mass(const v1::Particles& particles) {
   return particles.density() * std::numbers::pi / 6 * std::pow(particles.diameter(), 3);
@@ -55,7 +56,7 @@ TEST(ReadyCases, AreGoodAndNamedAsTheySay) {
 TEST(ReadyCases, HaveTheTenConditions) {
   std::set<std::string_view> names;
   for (const ReadyCase& ready : ready_cases()) names.insert(ready.name);
-  for (const std::string& bed : kBeds) EXPECT_TRUE(names.contains(bed)) << bed;
+  for (const std::string& bed : beds) EXPECT_TRUE(names.contains(bed)) << bed;
   EXPECT_EQ(ready_case_text("link"), ready_case_text("link-b2"));
 }
 
@@ -91,7 +92,7 @@ TEST(ReadyCases, HaveThePublishedCollisionTimesWeightsAndCells) {
 }
 
 TEST(ReadyCases, RunThroughTheirAveraging) {
-  for (const std::string& bed : kBeds) {
+  for (const std::string& bed : beds) {
     const v1::Case value = ready_case(bed);
     for (const v1::Monitor& monitor : value.monitors()) {
       if (!monitor.has_averaging()) continue;
@@ -102,7 +103,7 @@ TEST(ReadyCases, RunThroughTheirAveraging) {
 }
 
 TEST(ReadyCases, SeedSparselyEnoughAndGiveTimeToSettle) {
-  for (const std::string& bed : kBeds) {
+  for (const std::string& bed : beds) {
     const v1::Case value = ready_case(bed);
     const v1::Vector& high = value.particles().random().region().high();
     const double volume = high.x() * high.y() * high.z();
@@ -141,7 +142,7 @@ TEST(Presets, AreRefusedForWhatIsNotBuiltYetAndForNothingElse) {
       {"mfix-dpvm-smart", {"coupling.square_dpvm", "gas.smart"}},
       {"bedflow", {"gas.superbee"}}};
   EXPECT_EQ(ready_presets().size(), expected.size());
-  for (const std::string& bed : kBeds) {
+  for (const std::string& bed : beds) {
     for (const ReadyCase& preset : ready_presets()) {
       const auto faults = check_case(ready_case(bed, preset.name));
       std::vector<std::string> paths;

@@ -6,6 +6,7 @@
 
 #include "case_file.h"
 #include "cases/ready_cases.h"
+#include "support/case_faults.h"
 
 namespace bedflow {
 
@@ -32,10 +33,6 @@ std::vector<CaseFault> after(const Change& change) {
   return check_case(value);
 }
 
-auto fault(const std::string& path, const std::string& text) {
-  return AllOf(Field(&CaseFault::path, path), Field(&CaseFault::text, HasSubstr(text)));
-}
-
 v1::Face& bottom(v1::Case& c) {
   return *c.mutable_domain()->mutable_faces()->mutable_y_low();
 }
@@ -54,58 +51,59 @@ TEST(CaseRules, AreSilentOnGoodBedsAndOnParts) {
 
 TEST(CaseRules, SceneNeedsGasOrParticles) {
   EXPECT_THAT(after([](v1::Case& c) { c.clear_gas(), c.clear_particles(), c.clear_coupling(), c.mutable_time()->set_step(1); }),
-              ElementsAre(fault("gas", "and so is particles")));
+              ElementsAre(fault_at("gas", "and so is particles")));
 }
 
 TEST(CaseRules, GasAndParticlesNeedACoupling) {
-  EXPECT_THAT(after([](v1::Case& c) { c.clear_coupling(); }), ElementsAre(fault("coupling", "is missing")));
+  EXPECT_THAT(after([](v1::Case& c) { c.clear_coupling(); }), ElementsAre(fault_at("coupling", "is missing")));
 }
 
 TEST(CaseRules, CouplingNeedsBoth) {
-  EXPECT_THAT(after([](v1::Case& c) { c.clear_gas(); }), ElementsAre(fault("coupling", "no gas")));
+  EXPECT_THAT(after([](v1::Case& c) { c.clear_gas(); }), ElementsAre(fault_at("coupling", "no gas")));
   EXPECT_THAT(after([](v1::Case& c) { c.clear_particles(), c.mutable_time()->set_step(1e-3); }),
-              ElementsAre(fault("coupling", "no particles")));
+              ElementsAre(fault_at("coupling", "no particles")));
 }
 
 TEST(CaseRules, GasNeedsCells) {
-  EXPECT_THAT(after([](v1::Case& c) { c.mutable_domain()->clear_cells(); }), ElementsAre(fault("domain.cells", "gas")));
+  EXPECT_THAT(after([](v1::Case& c) { c.mutable_domain()->clear_cells(); }), ElementsAre(fault_at("domain.cells", "gas")));
 }
 
 TEST(CaseRules, StepMustBeSaidWithoutParticles) {
   EXPECT_THAT(after([](v1::Case& c) { c.clear_particles(), c.clear_coupling(); }),
-              ElementsAre(fault("time.step", "without particles")));
+              ElementsAre(fault_at("time.step", "without particles")));
 }
 
 TEST(CaseRules, ShortestStepIsNotAboveTheStep) {
   EXPECT_THAT(after([](v1::Case& c) { c.mutable_time()->set_step(1e-4), c.mutable_time()->set_shortest_step(2e-4); }),
-              ElementsAre(fault("time.shortest_step", "time.step")));
+              ElementsAre(fault_at("time.shortest_step", "time.step")));
   EXPECT_THAT(after([](v1::Case& c) { c.mutable_time()->set_step(1e-4), c.mutable_time()->set_shortest_step(1e-4); }), IsEmpty());
 }
 
 TEST(CaseRules, CellsMustHoldAParticleForTheHat) {
   // 0.120 m / 201 < 0.6 mm, half of the diameter; 200 cells are just allowed
   EXPECT_THAT(after([](v1::Case& c) { c.mutable_domain()->mutable_cells()->set_y(201); }),
-              ElementsAre(fault("domain.cells.y", "use at most 200")));
+              ElementsAre(fault_at("domain.cells.y", "use at most 200")));
   EXPECT_THAT(after([](v1::Case& c) { c.mutable_domain()->mutable_cells()->set_y(200); }), IsEmpty());
   EXPECT_THAT(after([](v1::Case& c) {
                 c.mutable_domain()->mutable_cells()->set_y(120);
                 c.mutable_domain()->mutable_cells()->set_x(50);
                 c.mutable_domain()->mutable_cells()->set_z(12);
               }),
-              ElementsAre(fault("domain.cells", "at least 1")));
+              ElementsAre(fault_at("domain.cells", "at least 1")));
   // a direction that is one cell deep is held to the same limit
-  EXPECT_THAT(after([](v1::Case& c) {
-                c.mutable_domain()->mutable_size()->set_z(0.0005);
-                c.mutable_domain()->mutable_cells()->set_z(1);
-                c.mutable_particles()->clear_random();
-                set_vector(c.mutable_particles()->mutable_placed()->add_spheres()->mutable_position(), 0.01, 0.01, 0);
-              }),
-              ElementsAre(fault("domain.cells.z", "make domain.size.z larger"), fault("particles.diameter", "domain.size.z")));
+  EXPECT_THAT(
+      after([](v1::Case& c) {
+        c.mutable_domain()->mutable_size()->set_z(0.0005);
+        c.mutable_domain()->mutable_cells()->set_z(1);
+        c.mutable_particles()->clear_random();
+        set_vector(c.mutable_particles()->mutable_placed()->add_spheres()->mutable_position(), 0.01, 0.01, 0);
+      }),
+      ElementsAre(fault_at("domain.cells.z", "make domain.size.z larger"), fault_at("particles.diameter", "domain.size.z")));
 }
 
 TEST(CaseRules, DragLawNeedsViscosity) {
   EXPECT_THAT(after([](v1::Case& c) { c.mutable_gas()->set_viscosity(0); }),
-              ElementsAre(fault("gas.viscosity", "coupling.drag")));
+              ElementsAre(fault_at("gas.viscosity", "coupling.drag")));
   EXPECT_THAT(after([](v1::Case& c) {
                 c.mutable_gas()->set_viscosity(0);
                 c.mutable_coupling()->mutable_constant_drag()->set_coefficient(1e-6);
@@ -118,7 +116,7 @@ TEST(CaseRules, PeriodicDirectionHasNoFaces) {
                 c.mutable_domain()->mutable_periodic()->set_z(true);
                 c.mutable_domain()->mutable_faces()->clear_z_low();
               }),
-              ElementsAre(fault("domain.faces.z_high", "domain.periodic.z")));
+              ElementsAre(fault_at("domain.faces.z_high", "domain.periodic.z")));
   EXPECT_THAT(after([](v1::Case& c) {
                 c.mutable_domain()->mutable_periodic()->set_z(true);
                 c.mutable_domain()->mutable_faces()->clear_z_low();
@@ -130,7 +128,7 @@ TEST(CaseRules, PeriodicDirectionHasNoFaces) {
 TEST(CaseRules, WallsSlideButDoNotMoveThroughTheirFace) {
   const auto wall = [](v1::Case& c) { return c.mutable_domain()->mutable_faces()->mutable_x_high()->mutable_no_slip_wall(); };
   EXPECT_THAT(after([&](v1::Case& c) { wall(c)->mutable_velocity()->set_x(1); }),
-              ElementsAre(fault("domain.faces.x_high.no_slip_wall.velocity.x", "is 1 m/s")));
+              ElementsAre(fault_at("domain.faces.x_high.no_slip_wall.velocity.x", "is 1 m/s")));
   EXPECT_THAT(after([&](v1::Case& c) { wall(c)->mutable_velocity()->set_y(1); }), IsEmpty());
 }
 
@@ -146,13 +144,13 @@ TEST(CaseRules, PatchesLieWithinTheirFace) {
   const std::string path = "domain.faces.y_low.inflow.patches[0].high";
   EXPECT_THAT(after(with_patch(0.01, 0.044, 0, 0.01)), IsEmpty());
   EXPECT_THAT(after(with_patch(0.01, 0.045, 0, 0.01)),
-              ElementsAre(fault(path + ".x", "outside the domain: at most domain.size.x, 0.044")));
-  EXPECT_THAT(after(with_patch(0.01, 0.02, 0.01, 0.01)), ElementsAre(fault(path + ".z", "not above")));
+              ElementsAre(fault_at(path + ".x", "outside the domain: at most domain.size.x, 0.044")));
+  EXPECT_THAT(after(with_patch(0.01, 0.02, 0.01, 0.01)), ElementsAre(fault_at(path + ".z", "not above")));
 }
 
 TEST(CaseRules, WhatFlowsInMustFlowOut) {
   EXPECT_THAT(after([](v1::Case& c) { c.mutable_domain()->mutable_faces()->mutable_y_high()->mutable_no_slip_wall(); }),
-              ElementsAre(fault("domain.faces.y_low.inflow", "set outflow")));
+              ElementsAre(fault_at("domain.faces.y_low.inflow", "set outflow")));
   EXPECT_THAT(after([](v1::Case& c) {
                 c.mutable_domain()->mutable_faces()->mutable_y_high()->mutable_no_slip_wall();
                 bottom(c).mutable_no_slip_wall();
@@ -167,12 +165,12 @@ TEST(CaseRules, ParticlesFitIntoTheDomain) {
                 c.mutable_particles()->clear_random();
                 set_vector(c.mutable_particles()->mutable_placed()->add_spheres()->mutable_position(), 0.01, 0.01, 0);
               }),
-              ElementsAre(fault("particles.diameter", "domain.size.z")));
+              ElementsAre(fault_at("particles.diameter", "domain.size.z")));
 }
 
 TEST(CaseRules, SkinIsBelowHalfTheSmallestEdge) {
   EXPECT_THAT(after([](v1::Case& c) { c.mutable_particles()->set_skin(0.005); }),
-              ElementsAre(fault("particles.skin", "0.005 m")));
+              ElementsAre(fault_at("particles.skin", "0.005 m")));
   EXPECT_THAT(after([](v1::Case& c) { c.mutable_particles()->set_skin(0.0049); }), IsEmpty());
 }
 
@@ -183,32 +181,33 @@ TEST(CaseRules, RegionIsInsideTheDomainAndHoldsAParticle) {
     return c.mutable_particles()->mutable_random()->mutable_region();
   };
   EXPECT_THAT(after([&](v1::Case& c) { region(c)->mutable_high()->set_y(0.2); }),
-              ElementsAre(fault(path + ".y", "domain.size.y")));
-  EXPECT_THAT(after([&](v1::Case& c) { region(c)->mutable_low()->set_x(0.044); }), ElementsAre(fault(path + ".x", "not above")));
+              ElementsAre(fault_at(path + ".y", "domain.size.y")));
+  EXPECT_THAT(after([&](v1::Case& c) { region(c)->mutable_low()->set_x(0.044); }),
+              ElementsAre(fault_at(path + ".x", "not above")));
   EXPECT_THAT(after([&](v1::Case& c) { region(c)->mutable_low()->set_x(0.0435); }),
-              ElementsAre(fault(path + ".x", "particles.diameter")));
+              ElementsAre(fault_at(path + ".x", "particles.diameter")));
 }
 
 TEST(CaseRules, RandomPlacingHasALargestCount) {
   // 0.35 · 44 · 68 · 10 mm³ / (π/6 · 1.2³ mm³) = 11574
   EXPECT_THAT(after([](v1::Case& c) { c.mutable_particles()->mutable_random()->set_count(11575); }),
-              ElementsAre(fault("particles.random.count", "which is 11574 particles")));
+              ElementsAre(fault_at("particles.random.count", "which is 11574 particles")));
   EXPECT_THAT(after([](v1::Case& c) { c.mutable_particles()->mutable_random()->set_count(11574); }), IsEmpty());
   EXPECT_THAT(after([](v1::Case& c) {
                 c.mutable_particles()->mutable_random()->set_count(30000);
                 c.mutable_particles()->mutable_random()->clear_region();
               }),
-              ElementsAre(fault("particles.random.count", "a solids fraction of 0.514")));
+              ElementsAre(fault_at("particles.random.count", "a solids fraction of 0.514")));
 }
 
 TEST(CaseRules, SettlingNeedsGravityAndAFloor) {
   EXPECT_THAT(after([](v1::Case& c) { c.mutable_gravity()->clear_y(); }),
-              ElementsAre(fault("particles.random.settling", "needs gravity")));
+              ElementsAre(fault_at("particles.random.settling", "needs gravity")));
   EXPECT_THAT(after([](v1::Case& c) {
                 c.mutable_domain()->clear_faces();
                 c.mutable_domain()->mutable_periodic()->set_y(true);
               }),
-              ElementsAre(fault("particles.random.settling", "domain.periodic.y")));
+              ElementsAre(fault_at("particles.random.settling", "domain.periodic.y")));
 }
 
 TEST(CaseRules, SpheresAreInsideAndApart) {
@@ -218,9 +217,9 @@ TEST(CaseRules, SpheresAreInsideAndApart) {
   };
   EXPECT_THAT(after([&](v1::Case& c) { place(c, 0, 0.12, 0.01), place(c, 0, 0.1195, 0.01); }), IsEmpty());  // overlap is allowed
   EXPECT_THAT(after([&](v1::Case& c) { place(c, 0.045, 0, 0); }),
-              ElementsAre(fault("particles.placed.spheres[0].position.x", "outside the domain")));
+              ElementsAre(fault_at("particles.placed.spheres[0].position.x", "outside the domain")));
   EXPECT_THAT(after([&](v1::Case& c) { place(c, 0.01, 0.01, 0), place(c, 0.02, 0.01, 0), place(c, 0.01, 0.01, 0); }),
-              ElementsAre(fault("particles.placed.spheres[2].position", "spheres[0].position")));
+              ElementsAre(fault_at("particles.placed.spheres[2].position", "spheres[0].position")));
 }
 
 TEST(CaseRules, LatticeIsNotDenserThanItsSpheres) {
@@ -233,7 +232,7 @@ TEST(CaseRules, LatticeIsNotDenserThanItsSpheres) {
     };
   };
   EXPECT_THAT(after(lattice(36)), IsEmpty());
-  EXPECT_THAT(after(lattice(44)), ElementsAre(fault("particles.lattice.count.x", "use at most 36")));
+  EXPECT_THAT(after(lattice(44)), ElementsAre(fault_at("particles.lattice.count.x", "use at most 36")));
 }
 
 // A monitor and what is to be said of it, at the path after "monitors[0]".
@@ -250,26 +249,26 @@ std::vector<CaseFault> of_monitor(
 TEST(CaseRules, MonitorsHaveNamesOfTheirOwn) {
   EXPECT_THAT(
       of_monitor([](v1::Monitor& m) { m.mutable_kinetic_energy(); }, [](v1::Case& c) { *c.add_monitors() = c.monitors(0); }),
-      ElementsAre(fault("monitors[1].name", "as monitors[0].name is")));
+      ElementsAre(fault_at("monitors[1].name", "as monitors[0].name is")));
 }
 
 TEST(CaseRules, MonitorsLieInsideTheDomain) {
   EXPECT_THAT(of_monitor([](v1::Monitor& m) { m.mutable_bed_height()->set_above(0.13); }),
-              ElementsAre(fault("monitors[0].bed_height.above", "domain.size.y")));
+              ElementsAre(fault_at("monitors[0].bed_height.above", "domain.size.y")));
   EXPECT_THAT(of_monitor([](v1::Monitor& m) { m.mutable_void_fraction()->set_height(0.13); }),
-              ElementsAre(fault("monitors[0].void_fraction.height", "domain.size.y")));
+              ElementsAre(fault_at("monitors[0].void_fraction.height", "domain.size.y")));
   EXPECT_THAT(of_monitor([](v1::Monitor& m) {
                 m.mutable_particle_velocity()->set_height(0.13);
                 m.mutable_particle_velocity()->set_bins(3);
                 m.mutable_particle_velocity()->set_depth_high(0.02);
               }),
-              ElementsAre(fault("monitors[0].particle_velocity.height", "domain.size.y"),
-                          fault("monitors[0].particle_velocity.depth_high", "domain.size.z")));
+              ElementsAre(fault_at("monitors[0].particle_velocity.height", "domain.size.y"),
+                          fault_at("monitors[0].particle_velocity.depth_high", "domain.size.z")));
   EXPECT_THAT(of_monitor([](v1::Monitor& m) {
                 m.mutable_pressure_drop()->set_low(0.01);
                 m.mutable_pressure_drop()->set_high(0.13);
               }),
-              ElementsAre(fault("monitors[0].pressure_drop.high", "domain.size.y")));
+              ElementsAre(fault_at("monitors[0].pressure_drop.high", "domain.size.y")));
 }
 
 TEST(CaseRules, MonitorsOrderTheirEnds) {
@@ -277,13 +276,13 @@ TEST(CaseRules, MonitorsOrderTheirEnds) {
                 m.mutable_pressure_drop()->set_low(0.02);
                 m.mutable_pressure_drop()->set_high(0.02);
               }),
-              ElementsAre(fault("monitors[0].pressure_drop.high", "not above")));
+              ElementsAre(fault_at("monitors[0].pressure_drop.high", "not above")));
   EXPECT_THAT(of_monitor([](v1::Monitor& m) {
                 m.mutable_particle_velocity()->set_height(0.01);
                 m.mutable_particle_velocity()->set_bins(3);
                 m.mutable_particle_velocity()->set_depth_low(0.01);
               }),
-              ElementsAre(fault("monitors[0].particle_velocity.depth_low", "domain.size.z")));
+              ElementsAre(fault_at("monitors[0].particle_velocity.depth_low", "domain.size.z")));
 }
 
 TEST(CaseRules, MonitorsNeedWhatTheyObserve) {
@@ -292,12 +291,12 @@ TEST(CaseRules, MonitorsNeedWhatTheyObserve) {
   const auto balance = [](v1::Monitor& m) { m.mutable_mass_balance(); };
   const auto exchange = [](v1::Monitor& m) { m.mutable_momentum_balance(); };
   const auto energy = [](v1::Monitor& m) { m.mutable_kinetic_energy(); };
-  EXPECT_THAT(of_monitor(balance, without_gas), ElementsAre(fault("monitors[0].mass_balance", "no gas")));
+  EXPECT_THAT(of_monitor(balance, without_gas), ElementsAre(fault_at("monitors[0].mass_balance", "no gas")));
   EXPECT_THAT(of_monitor(balance, without_particles), IsEmpty());
-  EXPECT_THAT(of_monitor(exchange, without_gas), ElementsAre(fault("monitors[0].momentum_balance", "no gas")));
-  EXPECT_THAT(of_monitor(exchange, without_particles), ElementsAre(fault("monitors[0].momentum_balance", "no particles")));
+  EXPECT_THAT(of_monitor(exchange, without_gas), ElementsAre(fault_at("monitors[0].momentum_balance", "no gas")));
+  EXPECT_THAT(of_monitor(exchange, without_particles), ElementsAre(fault_at("monitors[0].momentum_balance", "no particles")));
   EXPECT_THAT(of_monitor(energy, without_gas), IsEmpty());
-  EXPECT_THAT(of_monitor(energy, without_particles), ElementsAre(fault("monitors[0].kinetic_energy", "no particles")));
+  EXPECT_THAT(of_monitor(energy, without_particles), ElementsAre(fault_at("monitors[0].kinetic_energy", "no particles")));
 }
 
 TEST(CaseRules, ProfilesNeedAveraging) {
@@ -305,7 +304,7 @@ TEST(CaseRules, ProfilesNeedAveraging) {
                 m.mutable_void_fraction()->set_height(0.01);
                 m.clear_averaging();
               }),
-              ElementsAre(fault("monitors[0].averaging", "profile")));
+              ElementsAre(fault_at("monitors[0].averaging", "profile")));
 }
 
 TEST(CaseRules, AveragingMayReachBeyondTheEnd) {
@@ -326,8 +325,8 @@ TEST(CaseRules, ReferencesBelongToAMonitor) {
       added->add_points()->set_value(1);
     };
   };
-  EXPECT_THAT(of_monitor(profile, reference("two")), ElementsAre(fault("references[0].monitor", "is \"two\"")));
-  EXPECT_THAT(of_monitor(profile, reference("one")), ElementsAre(fault("references[0].points[0].x", "one is a profile")));
+  EXPECT_THAT(of_monitor(profile, reference("two")), ElementsAre(fault_at("references[0].monitor", "is \"two\"")));
+  EXPECT_THAT(of_monitor(profile, reference("one")), ElementsAre(fault_at("references[0].points[0].x", "one is a profile")));
   EXPECT_THAT(of_monitor([](v1::Monitor& m) { m.mutable_kinetic_energy(); }, reference("one")), IsEmpty());
 }
 

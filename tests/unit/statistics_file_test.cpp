@@ -18,7 +18,7 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 
 class StatisticsFile : public testing::Test {
  protected:
@@ -86,7 +86,7 @@ TEST(Estimate, OfTwelveBinsUsesStudentsQuantileOfElevenDegrees) {
 }
 
 TEST(Estimate, LeavesOutBinsWithoutAValue) {
-  const v1::Estimate result = estimate(std::vector{kNaN, 1.0, kNaN, 3.0});
+  const v1::Estimate result = estimate(std::vector{not_a_number, 1.0, not_a_number, 3.0});
   EXPECT_EQ(result.bins(), 2U);
   EXPECT_DOUBLE_EQ(result.mean(), 2);
   EXPECT_NEAR(result.half_width(), 12.70620, 1e-4);  // t(0.975, 1) · √2/√2
@@ -95,7 +95,7 @@ TEST(Estimate, LeavesOutBinsWithoutAValue) {
 TEST(Estimate, OfOneBinHasNoIntervalAndOfNoneNoMean) {
   EXPECT_TRUE(estimate(std::vector{1.0}).has_mean());
   EXPECT_FALSE(estimate(std::vector{1.0}).has_half_width());
-  EXPECT_FALSE(estimate(std::vector{kNaN}).has_mean());
+  EXPECT_FALSE(estimate(std::vector{not_a_number}).has_mean());
   EXPECT_EQ(estimate({}).bins(), 0U);
 }
 
@@ -104,7 +104,7 @@ TEST_F(StatisticsFile, GivesSeriesAndProfilesBack) {
   for (std::uint64_t step = 1; step <= 3; ++step) write_sample(step, 10.0 * static_cast<double>(step));
   write_bin(0, 0, 30, {5});
   write_bin(1, 0, 30, {0.4, 0.6});
-  write_bin(1, 1, 50, {0.6, kNaN});
+  write_bin(1, 1, 50, {0.6, not_a_number});
   const v1::Statistics found = read();
   ASSERT_EQ(found.series_size(), 1);
   EXPECT_THAT(found.series(0).step(), ElementsAre(1U, 2U, 3U));
