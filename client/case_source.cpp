@@ -51,7 +51,8 @@ std::optional<PathPart> path_part(const std::string& text) {
 
 const FieldDescriptor& field_of(const Message& message, const std::string& name, const std::string& assignment) {
   const auto* field = message.GetDescriptor()->FindFieldByName(name);
-  if (field == nullptr) refuse(assignment, "there is no field \"" + name + "\" here; there are " + field_names(*message.GetDescriptor()));
+  if (field == nullptr)
+    refuse(assignment, "there is no field \"" + name + "\" here; there are " + field_names(*message.GetDescriptor()));
   return *field;
 }
 
@@ -137,7 +138,8 @@ void set_value(v1::Case& value, const std::string& assignment) {
 
 v1::Case load_case(const std::string& where, const std::vector<std::string>& assignments) {
   auto [value, faults] = read_any(where);
-  const bool readable = std::none_of(faults.begin(), faults.end(), [](const auto& fault) { return fault.path.starts_with("line "); });
+  const bool readable =
+      std::none_of(faults.begin(), faults.end(), [](const auto& fault) { return fault.path.starts_with("line "); });
   if (!assignments.empty() && readable) {
     for (const auto& assignment : assignments) set_value(value, assignment);
     faults = check_case(value);

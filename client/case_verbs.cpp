@@ -40,7 +40,8 @@ Exit init(const Program&, const InitOptions& options) {
   const auto ready = ready_cases();
   const auto found = std::find_if(ready.begin(), ready.end(), [&](const auto& one) { return one.name == options.name; });
   if (found == ready.end()) {
-    throw Failure(Exit::usage, "there is no ready case \"" + options.name + "\"; there are " + ready_case_names(), "bedflow init");
+    throw Failure(Exit::usage, "there is no ready case \"" + options.name + "\"; there are " + ready_case_names(),
+                  "bedflow init");
   }
   const bool as_written = options.preset.empty() && options.set.empty() && options.format != Format::json;
   if (as_written) {  // with its comments
@@ -49,7 +50,8 @@ Exit init(const Program&, const InitOptions& options) {
   }
   const auto presets = ready_presets();
   const bool known = std::any_of(presets.begin(), presets.end(), [&](const auto& one) { return one.name == options.preset; });
-  if (!options.preset.empty() && !known) throw Failure(Exit::usage, "there is no preset \"" + options.preset + "\"", "the presets: bedflow init");
+  if (!options.preset.empty() && !known)
+    throw Failure(Exit::usage, "there is no preset \"" + options.preset + "\"", "the presets: bedflow init");
   auto value = ready_case(options.name, options.preset);
   for (const auto& assignment : options.set) set_value(value, assignment);
   print_data(options.format == Format::json || options.format == Format::jsonl ? case_json(value) : case_text(value));
@@ -70,7 +72,8 @@ Exit validate(const Program&, const CaseOptions& options) {
   try {
     const auto value = load_case(options.where, options.set);
     if (options.format != Format::table) print_data(Table({"path", "fault"}).text(options.format));
-    say(terminal.paint(Colour::green, "ok: ") + "the case \"" + value.name() + "\" has no faults; next: bedflow explain " + options.where);
+    say(terminal.paint(Colour::green, "ok: ") + "the case \"" + value.name() + "\" has no faults; next: bedflow explain " +
+        options.where);
     return Exit::ok;
   } catch (const Failure& failure) {
     if (options.format == Format::table || failure.faults.empty()) throw;
@@ -89,7 +92,8 @@ class TemporaryFile {
     const int file = mkstemps(path_.data(), 6);
     if (file < 0) throw std::system_error(errno, std::generic_category(), path_);
     close(file);
-    if (!(std::ofstream(path_) << text).flush()) throw Failure(Exit::limit, "the file " + path_ + " cannot be written: is the disk full?");
+    if (!(std::ofstream(path_) << text).flush())
+      throw Failure(Exit::limit, "the file " + path_ + " cannot be written: is the disk full?");
   }
   ~TemporaryFile() { unlink(path_.c_str()); }
   TemporaryFile(const TemporaryFile&) = delete;
@@ -108,8 +112,10 @@ Exit explain(const Program&, const CaseOptions& options) {
   v1::PlanReport report;
   if (result.exit_code != 0 || !google::protobuf::TextFormat::ParseFromString(result.out, &report)) {
     const auto code = result.exit_code == v1::INVALID_CASE ? Exit::usage : Exit::other;
-    throw Failure(code, "the case cannot be planned: " + (result.error.empty() ? "exit code " + std::to_string(result.exit_code) : result.error),
-                  "bedflow validate " + options.where);
+    throw Failure(
+        code,
+        "the case cannot be planned: " + (result.error.empty() ? "exit code " + std::to_string(result.exit_code) : result.error),
+        "bedflow validate " + options.where);
   }
   if (options.format == Format::table) {
     print_data(report.text().ends_with('\n') ? report.text() : report.text() + "\n");

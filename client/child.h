@@ -21,7 +21,8 @@ struct ChildResult {
 // Throws std::system_error, ENOENT if there is no such program.
 ChildResult run_child(const std::vector<std::string>& command, const std::string& input = {});
 
-// Starts a child in its own session with stdin empty and both outputs appended to a file. Returns its pid; throws std::system_error.
+// Starts a child in its own session with stdin empty and both outputs appended to a file. Returns its pid; throws
+// std::system_error.
 pid_t start_detached(const std::vector<std::string>& command, const std::filesystem::path& log);
 
 }  // namespace bedflow::client

@@ -37,19 +37,29 @@ class WaitingNote {
 Exit exit_of(grpc::StatusCode code) {
   switch (code) {
     case grpc::INVALID_ARGUMENT:
-    case grpc::OUT_OF_RANGE: return Exit::usage;
+    case grpc::OUT_OF_RANGE:
+      return Exit::usage;
     case grpc::PERMISSION_DENIED:
-    case grpc::UNAUTHENTICATED: return Exit::not_allowed;
-    case grpc::NOT_FOUND: return Exit::not_found;
+    case grpc::UNAUTHENTICATED:
+      return Exit::not_allowed;
+    case grpc::NOT_FOUND:
+      return Exit::not_found;
     case grpc::FAILED_PRECONDITION:
     case grpc::ALREADY_EXISTS:
-    case grpc::ABORTED: return Exit::wrong_state;
-    case grpc::UNAVAILABLE: return Exit::unreachable;
-    case grpc::DEADLINE_EXCEEDED: return Exit::timed_out;
-    case grpc::RESOURCE_EXHAUSTED: return Exit::limit;
-    case grpc::CANCELLED: return Exit::cancelled;
-    case grpc::DATA_LOSS: return Exit::corrupt;
-    default: return Exit::other;
+    case grpc::ABORTED:
+      return Exit::wrong_state;
+    case grpc::UNAVAILABLE:
+      return Exit::unreachable;
+    case grpc::DEADLINE_EXCEEDED:
+      return Exit::timed_out;
+    case grpc::RESOURCE_EXHAUSTED:
+      return Exit::limit;
+    case grpc::CANCELLED:
+      return Exit::cancelled;
+    case grpc::DATA_LOSS:
+      return Exit::corrupt;
+    default:
+      return Exit::other;
   }
 }
 

@@ -29,7 +29,8 @@ class Connection {
   template <class Request, class Response>
   Response call(Method<Request, Response> method, const Request& request, double seconds = 10) const {
     Response response;
-    const auto status = run([&](grpc::ClientContext* context) { return (stub_.get()->*method)(context, request, &response); }, seconds);
+    const auto status =
+        run([&](grpc::ClientContext* context) { return (stub_.get()->*method)(context, request, &response); }, seconds);
     if (!status.ok()) throw failure_of(status);
     return response;
   }

@@ -32,14 +32,18 @@ std::string last_of(const std::filesystem::path& log) {
 EmbeddedServer::EmbeddedServer(const std::filesystem::path& data) {
   std::error_code error;
   std::filesystem::create_directories(data, error);
-  if (error) throw Failure(Exit::other, "the data folder " + data.string() + " cannot be made: " + error.message(), "choose another with --data");
+  if (error)
+    throw Failure(Exit::other, "the data folder " + data.string() + " cannot be made: " + error.message(),
+                  "choose another with --data");
   data_ = std::filesystem::canonical(data);
   chmod(data_.c_str(), 0700);
   log_ = data_ / "bedflowd.log";
   const auto socket = data_ / "bedflowd.sock";
   if (socket.string().size() >= sizeof(sockaddr_un::sun_path)) {
-    throw Failure(Exit::usage, "the path " + socket.string() + " is too long for a socket: " + std::to_string(socket.string().size()) +
-                                   " bytes, at most " + std::to_string(sizeof(sockaddr_un::sun_path) - 1), "choose a shorter --data");
+    throw Failure(Exit::usage,
+                  "the path " + socket.string() + " is too long for a socket: " + std::to_string(socket.string().size()) +
+                      " bytes, at most " + std::to_string(sizeof(sockaddr_un::sun_path) - 1),
+                  "choose a shorter --data");
   }
   address_ = "unix:" + socket.string();
   if (std::filesystem::exists(socket) && answers(2)) return;
@@ -85,8 +89,10 @@ void EmbeddedServer::start() {
 void EmbeddedServer::wait_until_ready() {
   const auto limit = Clock::now() + kStartLimit;
   while (!answers(1)) {
-    if (child_ended()) throw Failure(Exit::unreachable, "the embedded server did not start: " + last_of(log_), "its log is " + log_.string());
-    if (Clock::now() > limit) throw Failure(Exit::unreachable, "the embedded server does not answer: " + last_of(log_), "its log is " + log_.string());
+    if (child_ended())
+      throw Failure(Exit::unreachable, "the embedded server did not start: " + last_of(log_), "its log is " + log_.string());
+    if (Clock::now() > limit)
+      throw Failure(Exit::unreachable, "the embedded server does not answer: " + last_of(log_), "its log is " + log_.string());
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
 }

@@ -1,4 +1,5 @@
-// A bedflowd of the client's own, on a socket in its data folder, for `bedflow run`. It outlives the client only as long as jobs run.
+// A bedflowd of the client's own, on a socket in its data folder, for `bedflow run`. It outlives the client only as long as jobs
+// run.
 #pragma once
 
 #include <sys/types.h>

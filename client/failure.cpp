@@ -22,10 +22,14 @@ bool is_final(v1::JobState state) {
 
 Exit exit_of(const v1::Job& job) {
   switch (job.state()) {
-    case v1::SUCCEEDED: return Exit::ok;
-    case v1::STATE_CANCELLED: return Exit::cancelled;
-    case v1::FAILED: return job.reason() == v1::CHECKPOINT_CORRUPT ? Exit::corrupt : Exit::job_failed;
-    default: return Exit::wrong_state;
+    case v1::SUCCEEDED:
+      return Exit::ok;
+    case v1::STATE_CANCELLED:
+      return Exit::cancelled;
+    case v1::FAILED:
+      return job.reason() == v1::CHECKPOINT_CORRUPT ? Exit::corrupt : Exit::job_failed;
+    default:
+      return Exit::wrong_state;
   }
 }
 
@@ -36,6 +40,8 @@ std::string state_name(v1::JobState state) {
   return name.starts_with("STATE_") ? name.substr(6) : name;
 }
 
-std::string reason_name(v1::StopReason reason) { return v1::StopReason_Name(reason); }
+std::string reason_name(v1::StopReason reason) {
+  return v1::StopReason_Name(reason);
+}
 
 }  // namespace bedflow::client

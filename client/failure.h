@@ -28,7 +28,8 @@ enum class Exit : int {
 
 // What happened, with the value and the allowed range; what helps next; and every fault when it is a case that is wrong.
 struct Failure : std::runtime_error {
-  Failure(Exit exit_code, const std::string& what_happened, std::string next_command = {}, std::vector<CaseFault> case_faults = {})
+  Failure(Exit exit_code, const std::string& what_happened, std::string next_command = {},
+          std::vector<CaseFault> case_faults = {})
       : std::runtime_error(what_happened), code(exit_code), next(std::move(next_command)), faults(std::move(case_faults)) {}
   Exit code;
   std::string next;

@@ -19,9 +19,12 @@ std::string gnuplot_quoted(const std::string& text) {
 
 std::string picture_head(const std::filesystem::path& file, PictureSize size) {
   return "set encoding utf8\n"
-         "set terminal pngcairo noenhanced size " + std::to_string(size.width) + "," + std::to_string(size.height) +
+         "set terminal pngcairo noenhanced size " +
+         std::to_string(size.width) + "," + std::to_string(size.height) +
          " font \"DejaVu Sans,13\" linewidth 1.4 background rgb \"#ffffff\"\n"
-         "set output " + gnuplot_quoted(file.string()) + "\n"
+         "set output " +
+         gnuplot_quoted(file.string()) +
+         "\n"
          "set datafile missing \"NaN\"\n"
          "set border 3 lw 1 lc rgb \"#444444\"\n"
          "set tics nomirror out scale 0.6 textcolor rgb \"#222222\"\n"
@@ -32,7 +35,8 @@ void draw_picture(const std::string& script, const std::filesystem::path& file) 
   std::error_code ignored;
   const auto folder = std::filesystem::absolute(file).parent_path();
   if (!std::filesystem::is_directory(folder)) {
-    throw Failure(Exit::usage, "the folder " + folder.string() + " for the picture does not exist", "mkdir -p " + folder.string());
+    throw Failure(Exit::usage, "the folder " + folder.string() + " for the picture does not exist",
+                  "mkdir -p " + folder.string());
   }
   std::filesystem::remove(file, ignored);
   ChildResult result;

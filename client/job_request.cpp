@@ -24,7 +24,8 @@ void add_job_options(CLI::App* verb, JobOptions& options) {
   verb->add_option("--set", options.set, "change a parameter, as in time.end=2")->type_name("PATH=VALUE");
   verb->add_option("--end", options.end, "simulated time at which to end, s")->check(CLI::PositiveNumber);
   verb->add_option("--ranks", options.ranks, "MPI ranks")->check(CLI::Range(1, 100000))->default_str("1");
-  verb->add_option("--checkpoint-every", options.checkpoint_every, "simulated time between checkpoints, s")->check(CLI::PositiveNumber);
+  verb->add_option("--checkpoint-every", options.checkpoint_every, "simulated time between checkpoints, s")
+      ->check(CLI::PositiveNumber);
   verb->add_option("--checkpoint-steps", options.checkpoint_steps, "steps between checkpoints")->check(CLI::PositiveNumber);
   verb->add_option("--wall-limit", options.wall_limit, "stop after so much wall time, s")->check(CLI::PositiveNumber);
   verb->add_option("--label", options.labels, "label to find the job by")->type_name("NAME=VALUE");

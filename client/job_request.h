@@ -14,12 +14,12 @@ namespace bedflow::client {
 struct JobOptions {
   std::string where;
   std::vector<std::string> set;
-  std::optional<double> end;                // s
-  std::optional<std::uint32_t> ranks;       // 1 if absent
-  std::optional<double> checkpoint_every;   // simulated s
+  std::optional<double> end;               // s
+  std::optional<std::uint32_t> ranks;      // 1 if absent
+  std::optional<double> checkpoint_every;  // simulated s
   std::optional<std::uint64_t> checkpoint_steps;
-  std::optional<double> wall_limit;         // s
-  std::vector<std::string> labels;          // name=value
+  std::optional<double> wall_limit;  // s
+  std::vector<std::string> labels;   // name=value
 };
 
 void add_job_options(CLI::App* verb, JobOptions& options);

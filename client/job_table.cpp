@@ -30,8 +30,9 @@ std::string state_text(const v1::Job& job) {
 Table table_of(const std::vector<v1::Job>& jobs) {
   Table table({"id", "case", "state", "progress", "time_s", "eta", "ranks", "created"});
   for (const auto& job : jobs) {
-    table.add({job.id(), job.case_name(), state_text(job), progress_text(job), job.has_progress() ? Cell(job.progress().time()) : Cell(),
-               eta_cell(job), std::uint64_t{job.spec().ranks()}, time_text(job.created_unix_nanos())});
+    table.add({job.id(), job.case_name(), state_text(job), progress_text(job),
+               job.has_progress() ? Cell(job.progress().time()) : Cell(), eta_cell(job), std::uint64_t{job.spec().ranks()},
+               time_text(job.created_unix_nanos())});
   }
   return table;
 }
@@ -54,7 +55,8 @@ Table table_of(const v1::Job& job) {
   table.add({"created", time_text(job.created_unix_nanos())});
   table.add({"changed", time_text(job.changed_unix_nanos())});
   table.add({"last event", std::to_string(job.last_sequence())});
-  if (job.has_start_from_job()) table.add({"started from", job.start_from_job() + ", step " + std::to_string(job.start_from_step())});
+  if (job.has_start_from_job())
+    table.add({"started from", job.start_from_job() + ", step " + std::to_string(job.start_from_step())});
   for (const auto& [name, value] : job.spec().labels()) table.add({"label " + name, value});
   if (!job.folder().empty()) table.add({"folder", job.folder()});
   return table;

@@ -13,8 +13,8 @@ std::vector<const google::protobuf::Message*> pointers(const Messages& messages)
   return all;
 }
 
-Table table_of(const std::vector<v1::Job>& jobs);      // a line a job
-Table table_of(const v1::Job& job);                    // a line a property
+Table table_of(const std::vector<v1::Job>& jobs);  // a line a job
+Table table_of(const v1::Job& job);                // a line a property
 Table table_of(const std::vector<v1::Checkpoint>& checkpoints);
 
 }  // namespace bedflow::client

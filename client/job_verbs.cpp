@@ -23,7 +23,8 @@ v1::CheckpointName checkpoint_name(const std::string& text) {
   if (at == text.npos) return name;
   const auto step = text.substr(at + 1);
   if (step.empty() || step.size() > 18 || step.find_first_not_of("0123456789") != step.npos) {
-    throw Failure(Exit::usage, "--start-from " + text + ": the step after @ is not a number", "bedflow checkpoint list " + name.job());
+    throw Failure(Exit::usage, "--start-from " + text + ": the step after @ is not a number",
+                  "bedflow checkpoint list " + name.job());
   }
   name.set_step(std::stoull(step));
   return name;
@@ -47,14 +48,18 @@ Exit submit(const Program& program, const SubmitOptions& options) {
   if (options.validate_only) {
     Table table({"part", "on", "why"});
     for (const auto& item : response.plan().items()) table.add({item.part(), item.on(), item.why()});
-    if (options.format == Format::table && response.plan().has_text()) print_data(response.plan().text() + "\n");
-    else print_message(response.plan(), table, options.format);
+    if (options.format == Format::table && response.plan().has_text())
+      print_data(response.plan().text() + "\n");
+    else
+      print_message(response.plan(), table, options.format);
     say("nothing was submitted (--validate-only)");
     return Exit::ok;
   }
   const auto& id = response.job().id();
-  if (options.format == Format::table) print_data(id + "\n");
-  else print_message(response.job(), table_of(std::vector{response.job()}), options.format);
+  if (options.format == Format::table)
+    print_data(id + "\n");
+  else
+    print_message(response.job(), table_of(std::vector{response.job()}), options.format);
   if (!options.watch) {
     say("submitted; next: bedflow watch " + id);
     return Exit::ok;

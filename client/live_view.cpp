@@ -6,10 +6,14 @@ namespace {
 
 Colour colour_of(v1::JobState state) {
   switch (state) {
-    case v1::FAILED: return Colour::red;
-    case v1::SUCCEEDED: return Colour::green;
-    case v1::RUNNING: return Colour::cyan;
-    default: return Colour::yellow;
+    case v1::FAILED:
+      return Colour::red;
+    case v1::SUCCEEDED:
+      return Colour::green;
+    case v1::RUNNING:
+      return Colour::cyan;
+    default:
+      return Colour::yellow;
   }
 }
 
@@ -29,7 +33,8 @@ class LiveView {
       state_ = response.job().state();
       if (is_final(*state_)) display_.finish();
       display_.message(state_line(display_.terminal(), response.job()));
-      if (!response.has_event() && response.job().has_progress() && !is_final(*state_)) display_.update(response.job().progress());
+      if (!response.has_event() && response.job().has_progress() && !is_final(*state_))
+        display_.update(response.job().progress());
     }
     if (!response.has_event()) return;
     const auto& event = response.event();
@@ -54,20 +59,26 @@ std::string event_line(const v1::Event& event) {
       const auto& started = event.started();
       const std::string ranks = std::to_string(started.ranks()) + (started.ranks() == 1 ? " rank" : " ranks");
       if (started.from_checkpoint().empty()) return "started on " + ranks;
-      return "resumed on " + ranks + " from " + started.from_checkpoint() + ", step " + std::to_string(started.step()) + ", t = " +
-             number_text(started.time()) + " s";
+      return "resumed on " + ranks + " from " + started.from_checkpoint() + ", step " + std::to_string(started.step()) +
+             ", t = " + number_text(started.time()) + " s";
     }
     case v1::Event::kCheckpoint:
-      return "checkpoint of step " + std::to_string(event.checkpoint().step()) + ", t = " + number_text(event.checkpoint().time()) +
-             " s, " + bytes_text(static_cast<double>(event.checkpoint().bytes()));
+      return "checkpoint of step " + std::to_string(event.checkpoint().step()) +
+             ", t = " + number_text(event.checkpoint().time()) + " s, " +
+             bytes_text(static_cast<double>(event.checkpoint().bytes()));
     case v1::Event::kLog: {
       const auto severity = event.log().severity();
-      return (severity == v1::LogLine::INFO ? "" : severity == v1::LogLine::WARNING ? "warning: " : "error: ") + event.log().text();
+      return (severity == v1::LogLine::INFO      ? ""
+              : severity == v1::LogLine::WARNING ? "warning: "
+                                                 : "error: ") +
+             event.log().text();
     }
     case v1::Event::kStopped:
-      return "stopped at step " + std::to_string(event.stopped().step()) + ", t = " + number_text(event.stopped().time()) + " s: " +
-             reason_name(event.stopped().reason()) + (event.stopped().message().empty() ? "" : ", " + event.stopped().message());
-    default: return "";
+      return "stopped at step " + std::to_string(event.stopped().step()) + ", t = " + number_text(event.stopped().time()) +
+             " s: " + reason_name(event.stopped().reason()) +
+             (event.stopped().message().empty() ? "" : ", " + event.stopped().message());
+    default:
+      return "";
   }
 }
 
@@ -85,8 +96,10 @@ LiveEnd view_job(const Connection& connection, const std::string& id, const Live
     return {Exit::interrupted, result.job};
   }
   if (result.end == WatchEnd::timed_out) {
-    throw Failure(Exit::timed_out, "the job " + id + " is still " + state_name(result.job.state()) + " after " +
-                                       duration_text(options.plan.timeout_seconds.value_or(0)), "bedflow watch " + id);
+    throw Failure(Exit::timed_out,
+                  "the job " + id + " is still " + state_name(result.job.state()) + " after " +
+                      duration_text(options.plan.timeout_seconds.value_or(0)),
+                  "bedflow watch " + id);
   }
   return {is_final(result.job.state()) ? exit_of(result.job) : Exit::ok, result.job};
 }

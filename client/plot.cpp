@@ -17,7 +17,9 @@ constexpr const char* kOurs = "#1f5fa8";
 constexpr const char* kBand = "#c9dcf2";
 constexpr const char* kMeasured = "#c0392b";
 
-std::string number(double value) { return std::isfinite(value) ? number_text(value) : "NaN"; }
+std::string number(double value) {
+  return std::isfinite(value) ? number_text(value) : "NaN";
+}
 
 std::string spaced(std::string name) {
   std::replace(name.begin(), name.end(), '_', ' ');
@@ -95,8 +97,8 @@ std::string row(std::initializer_list<double> values) {
 }
 
 // Reference means without a place hold over the whole time: a dashed line, with its interval where it has one.
-void draw_references(Panel& panel, const std::vector<const v1::Reference*>& references, double x_factor, double factor, double from,
-                     double to) {
+void draw_references(Panel& panel, const std::vector<const v1::Reference*>& references, double x_factor, double factor,
+                     double from, double to) {
   int symbol = 6;  // open circle, then open triangle, square, diamond
   for (const auto* reference : references) {
     const std::string title = " title " + gnuplot_quoted(reference->source()) + " ";
@@ -109,8 +111,10 @@ void draw_references(Panel& panel, const std::vector<const v1::Reference*>& refe
         intervals = intervals || point.has_half_width();
         continue;
       }
-      const auto line = panel.block(row({from, value, value - half, value + half}) + row({to, value, value - half, value + half}));
-      if (point.has_half_width()) panel.draw(line + " using 1:3:4 with filledcurves fc rgb \"" + kMeasured + "\" fs transparent solid 0.12 notitle");
+      const auto line =
+          panel.block(row({from, value, value - half, value + half}) + row({to, value, value - half, value + half}));
+      if (point.has_half_width())
+        panel.draw(line + " using 1:3:4 with filledcurves fc rgb \"" + kMeasured + "\" fs transparent solid 0.12 notitle");
       panel.draw(line + " using 1:2 with lines dt 2 lw 1.6 lc rgb \"" + kMeasured + "\"" + title);
     }
     if (points.empty()) continue;
@@ -135,11 +139,14 @@ std::string series_panel(const v1::Series& series, const std::optional<v1::Case>
   const double to = known && averaged ? from + monitor->averaging().bin() * series.average().bins() : end;
   const double mean = series.average().mean() * y.factor, half = series.average().half_width() * y.factor;
   const bool interval = averaged && series.average().has_half_width();
-  const auto bins = averaged ? panel.block(row({from, mean, mean - half, mean + half}) + row({to, mean, mean - half, mean + half})) : "";
+  const auto bins =
+      averaged ? panel.block(row({from, mean, mean - half, mean + half}) + row({to, mean, mean - half, mean + half})) : "";
   if (interval) panel.draw(bins + " using 1:3:4 with filledcurves fc rgb \"" + kBand + "\" title \"95 % interval of the mean\"");
-  panel.draw(panel.block(rows.empty() ? row({NAN, NAN}) : rows) + " using 1:2 with lines lw 1.3 lc rgb \"" + kOurs + "\" title \"bedflow\"");
+  panel.draw(panel.block(rows.empty() ? row({NAN, NAN}) : rows) + " using 1:2 with lines lw 1.3 lc rgb \"" + kOurs +
+             "\" title \"bedflow\"");
   if (averaged) {
-    const std::string title = "mean of " + std::to_string(series.average().bins()) + (series.average().bins() == 1 ? " bin" : " bins");
+    const std::string title =
+        "mean of " + std::to_string(series.average().bins()) + (series.average().bins() == 1 ? " bin" : " bins");
     panel.draw(bins + " using 1:2 with lines lw 2.2 lc rgb \"#0b2e59\" title " + gnuplot_quoted(title));
   }
   draw_references(panel, references_of(value, series.name()), 1, y.factor, series.time_size() ? series.time(0) : 0, end);
@@ -165,8 +172,8 @@ std::string profile_panel(const v1::Profile& profile, const std::optional<v1::Ca
   }
   const auto data = panel.block(rows.empty() ? row({NAN, NAN, NAN}) : rows);
   panel.draw(data + " using 1:2 with lines lw 1 lc rgb \"" + kOurs + "\" notitle");
-  panel.draw(data + (intervals ? " using 1:2:3 with yerrorbars" : " using 1:2 with points") + " pt 7 ps 0.9 lw 1.3 lc rgb \"" + kOurs +
-             "\" title \"" + (intervals ? "bedflow, 95 % interval" : "bedflow") + "\"");
+  panel.draw(data + (intervals ? " using 1:2:3 with yerrorbars" : " using 1:2 with points") + " pt 7 ps 0.9 lw 1.3 lc rgb \"" +
+             kOurs + "\" title \"" + (intervals ? "bedflow, 95 % interval" : "bedflow") + "\"");
   draw_references(panel, references_of(value, profile.name()), x.factor, y.factor, 0, 0);
   return panel.script();
 }
@@ -183,7 +190,7 @@ std::string plot_script(const v1::Statistics& statistics, const std::optional<v1
   title += "    step " + std::to_string(statistics.step()) + ", t = " + number(statistics.time()) + " s";
   text += "set multiplot layout " + std::to_string(rows) + "," + std::to_string(columns) + " title " + gnuplot_quoted(title) +
           " font \",16\"\n";
-  text += "set key top right samplen 2.5 spacing 1.15 opaque box lc rgb \"#dddddd\" lw 0.6\n";
+  text += "set key below center horizontal Left reverse samplen 2 spacing 1.1 width 2 nobox\n";
   int index = 0;
   for (const auto& series : statistics.series()) text += series_panel(series, value, index++);
   for (const auto& profile : statistics.profiles()) text += profile_panel(profile, value, index++);

@@ -47,7 +47,8 @@ double eta(const v1::Progress& progress, const SpeedGauge& speed) {
 
 void SpeedGauge::add(const v1::Progress& progress) {
   const Point point = {progress.wall_seconds(), progress.time(), static_cast<double>(progress.step())};
-  if (!points_.empty() && (point.wall < points_.back().wall || point.step < points_.back().step)) points_.clear();  // a new attempt
+  if (!points_.empty() && (point.wall < points_.back().wall || point.step < points_.back().step))
+    points_.clear();  // a new attempt
   if (!points_.empty() && point.wall == points_.back().wall) points_.pop_back();
   points_.push_back(point);
   while (points_.size() > 2 && points_.back().wall - points_[1].wall > kSpeedWindow) points_.pop_front();

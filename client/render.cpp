@@ -47,15 +47,16 @@ class Drawing {
     const double left = Page::left + shown_ * (page_.map_width + Page::gap);
     ++shown_;
     const double x0 = left / width_, x1 = (left + page_.map_width) / width_;
-    const double y0 = static_cast<double>(Page::bottom) / height_, y1 = (Page::bottom + page_.map_height) / static_cast<double>(height_);
+    const double y0 = static_cast<double>(Page::bottom) / height_,
+                 y1 = (Page::bottom + page_.map_height) / static_cast<double>(height_);
     const double bar = std::max(page_.map_width, 200);
     const double bar_left = left + 0.5 * (page_.map_width - bar);
     std::string text = "set lmargin at screen " + number_text(x0) + "\nset rmargin at screen " + number_text(x1) +
                        "\nset bmargin at screen " + number_text(y0) + "\nset tmargin at screen " + number_text(y1) + "\n";
     text += "set title " + gnuplot_quoted(title) + " font \",14\" offset 0,-0.3\n";
     text += "set palette defined " + std::string(palette) + "\n";
-    text += "set colorbox horizontal user origin " + number_text(bar_left / width_) + "," + number_text(62.0 / height_) + " size " +
-            number_text(bar / width_) + "," + number_text(16.0 / height_) + " border lc rgb \"#444444\"\n";
+    text += "set colorbox horizontal user origin " + number_text(bar_left / width_) + "," + number_text(62.0 / height_) +
+            " size " + number_text(bar / width_) + "," + number_text(16.0 / height_) + " border 9\n";
     text += "set cblabel " + gnuplot_quoted(bar_label) + " offset 0,0.4\n";
     text += std::string("set ylabel ") + (heights ? "\"height  /  mm\"" : "\"\"") + "\n";
     return text;
@@ -70,7 +71,8 @@ class Drawing {
     std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return position[3 * a + 2] > position[3 * b + 2]; });
     std::string rows;
     for (const int i : order) {
-      rows += number_text(1e3 * position[3 * i]) + " " + number_text(1e3 * position[3 * i + 1]) + " " + number_text(snapshot_.speed(i)) + "\n";
+      rows += number_text(1e3 * position[3 * i]) + " " + number_text(1e3 * position[3 * i + 1]) + " " +
+              number_text(snapshot_.speed(i)) + "\n";
     }
     return rows;
   }
@@ -91,7 +93,8 @@ class Drawing {
     int index = 0;
     for (std::uint32_t j = 0; j < cells.y(); ++j) {
       for (std::uint32_t i = 0; i < cells.x(); ++i) {
-        rows += number_text((i + 0.5) * dx) + " " + number_text((j + 0.5) * dy) + " " + number_text(snapshot_.gas_fraction(index++)) + "\n";
+        rows += number_text((i + 0.5) * dx) + " " + number_text((j + 0.5) * dy) + " " +
+                number_text(snapshot_.gas_fraction(index++)) + "\n";
       }
     }
     return rows;
@@ -100,9 +103,9 @@ class Drawing {
   // With a thin rim that tells neighbours of one colour apart, as long as a circle has pixels enough for it.
   std::string circles() const {
     const double pixels = snapshot_.diameter() * page_.scale;
-    const std::string rim = pixels >= 5 ? "border lc rgb \"#40202020\" lw 0.4" : "noborder";
-    return "plot $particles using 1:2:(" + number_text(500 * snapshot_.diameter()) + "):3 with circles fillcolor palette fillstyle solid 1.0 " +
-           rim + " notitle\n";
+    const std::string rim = pixels >= 5 ? "border lc rgb \"#303030\"" : "noborder";
+    return "plot $particles using 1:2:(" + number_text(500 * snapshot_.diameter()) +
+           "):3 with circles fillcolor palette lw 0.35 fillstyle solid 1.0 " + rim + " notitle\n";
   }
 
  private:
@@ -117,14 +120,17 @@ class Drawing {
 std::string render_script(const v1::Snapshot& snapshot, const std::string& job, const std::filesystem::path& file) {
   const bool particles = snapshot.speed_size() > 0 && snapshot.position_size() == 3 * snapshot.speed_size();
   const auto& cells = snapshot.cells();
-  const bool gas = snapshot.gas_fraction_size() > 0 && std::uint64_t{cells.x()} * cells.y() == static_cast<std::uint64_t>(snapshot.gas_fraction_size());
+  const bool gas = snapshot.gas_fraction_size() > 0 &&
+                   std::uint64_t{cells.x()} * cells.y() == static_cast<std::uint64_t>(snapshot.gas_fraction_size());
   const bool sized = snapshot.size().x() > 0 && snapshot.size().y() > 0;
-  if (!sized || (!particles && !gas)) throw Failure(Exit::other, "the checkpoint of " + job + " has neither particles nor gas to draw");
+  if (!sized || (!particles && !gas))
+    throw Failure(Exit::other, "the checkpoint of " + job + " has neither particles nor gas to draw");
   Drawing drawing(snapshot, particles + gas);
   std::string text = picture_head(file, drawing.size());
   text += "set multiplot title " + gnuplot_quoted(job + "    t = " + number_text(snapshot.time()) + " s") + " font \",16\"\n";
-  text += "set border 15 lw 1 lc rgb \"#444444\"\nunset grid\nunset key\n";
-  text += "set xrange [0:" + number_text(1e3 * snapshot.size().x()) + "]\nset yrange [0:" + number_text(1e3 * snapshot.size().y()) + "]\n";
+  text += "set style line 9 lw 0.8 lc rgb \"#444444\"\nset border 15 lw 1 lc rgb \"#444444\"\nunset grid\nunset key\n";
+  text += "set xrange [0:" + number_text(1e3 * snapshot.size().x()) +
+          "]\nset yrange [0:" + number_text(1e3 * snapshot.size().y()) + "]\n";
   text += "set xlabel \"width  /  mm\"\nset xtics autofreq\nset cbtics out scale 0.4\n";
   if (particles) {
     text += "$particles << EOD\n" + drawing.particles() + "EOD\n";

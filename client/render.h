@@ -1,4 +1,5 @@
-// A picture of the bed from one checkpoint: particles coloured by speed in front view, and the gas fraction averaged over the depth.
+// A picture of the bed from one checkpoint: particles coloured by speed in front view, and the gas fraction averaged over the
+// depth.
 #pragma once
 
 #include <filesystem>

@@ -20,9 +20,12 @@ struct StatsOptions {
 
 Exit stats(const Program& program, const StatsOptions& options) {
   const auto statistics = Results(options.job, program.server).statistics(options.query);
-  if (statistics.series_size() + statistics.profiles_size() == 0) say("no statistics yet: the case has no monitors, or the job has not begun");
-  if (options.samples) print_samples(statistics, options.format);
-  else print_statistics(statistics, options.format);
+  if (statistics.series_size() + statistics.profiles_size() == 0)
+    say("no statistics yet: the case has no monitors, or the job has not begun");
+  if (options.samples)
+    print_samples(statistics, options.format);
+  else
+    print_statistics(statistics, options.format);
   return Exit::ok;
 }
 
@@ -90,7 +93,9 @@ void add_result_verbs(CLI::App& app, Program& program) {
   verb->add_option("job", render_options->job, "id of the job, or its folder")->required();
   verb->add_option("-o,--out", render_options->out, "the picture")->required()->type_name("FILE.png");
   verb->add_option("--step", render_options->step, "checkpoint of this step; the newest good one if absent");
-  verb->add_option("--most", render_options->most, "at most so many particles")->check(CLI::PositiveNumber)->capture_default_str();
+  verb->add_option("--most", render_options->most, "at most so many particles")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
   on_call(verb, program, render_options, render);
 }
 

@@ -28,13 +28,16 @@ std::vector<std::filesystem::path> checkpoints_of(const std::filesystem::path& f
 
 }  // namespace
 
-bool is_job_folder(const std::filesystem::path& path) { return std::filesystem::exists(path / "case.txtpb"); }
+bool is_job_folder(const std::filesystem::path& path) {
+  return std::filesystem::exists(path / "case.txtpb");
+}
 
 Results::Results(const std::string& job, const std::string& server) : server_(server) {
   if (is_job_folder(job)) {
     folder_ = std::filesystem::canonical(job);
   } else if (job.find('/') != job.npos || std::filesystem::is_directory(job)) {
-    throw Failure(Exit::not_found, "\"" + job + "\" is not a job folder: it has no case.txtpb", "the jobs of the server: bedflow list");
+    throw Failure(Exit::not_found, "\"" + job + "\" is not a job folder: it has no case.txtpb",
+                  "the jobs of the server: bedflow list");
   } else {
     id_ = job;
   }
@@ -44,7 +47,8 @@ v1::Statistics Results::statistics(const StatisticsQuery& query) const {
   if (!folder_.empty()) {
     const auto log = folder_ / "statistics.log";
     if (!std::filesystem::exists(log)) {
-      throw Failure(Exit::not_found, "the job folder " + folder_.string() + " has no statistics yet", "its events: bedflow logs " + folder_.string());
+      throw Failure(Exit::not_found, "the job folder " + folder_.string() + " has no statistics yet",
+                    "its events: bedflow logs " + folder_.string());
     }
     try {
       return read_statistics(log, query);
@@ -107,10 +111,13 @@ v1::Snapshot Results::snapshot_from_file(const std::filesystem::path& checkpoint
   if (result.exit_code == 0 && snapshot.ParseFromString(result.out)) return snapshot;
   const bool corrupt = result.exit_code == v1::CHECKPOINT_CORRUPT;
   const auto told = result.error.substr(0, result.error.find_last_not_of('\n') + 1);
-  throw Failure(corrupt ? Exit::corrupt : Exit::other, "the checkpoint " + checkpoint.string() + " cannot be read" +
-                                                           (told.empty() ? ", exit code " + std::to_string(result.exit_code) : ": " + told));
+  throw Failure(corrupt ? Exit::corrupt : Exit::other,
+                "the checkpoint " + checkpoint.string() + " cannot be read" +
+                    (told.empty() ? ", exit code " + std::to_string(result.exit_code) : ": " + told));
 }
 
-std::string Results::name() const { return folder_.empty() ? id_ : folder_.filename().string(); }
+std::string Results::name() const {
+  return folder_.empty() ? id_ : folder_.filename().string();
+}
 
 }  // namespace bedflow::client

@@ -31,7 +31,8 @@ ResumeTarget resume_target(const std::string& where) {
     std::string there;
     std::error_code error;
     const auto data = std::filesystem::is_directory(path / "jobs") ? path : target.data;
-    for (const auto& entry : std::filesystem::directory_iterator(data / "jobs", error)) there += " " + (data / entry.path().filename()).string();
+    for (const auto& entry : std::filesystem::directory_iterator(data / "jobs", error))
+      there += " " + (data / entry.path().filename()).string();
     throw Failure(Exit::not_found, "--resume " + where + ": there is no such job" + (there.empty() ? "" : "; there are" + there),
                   "bedflow run --resume FOLDER/ID");
   }
@@ -102,8 +103,8 @@ Exit run(const Program&, const RunOptions& options) {
   }
   const auto target = options.resume.empty() ? ResumeTarget{options.data, ""} : resume_target(options.resume);
   const auto request = options.resume.empty() ? create_request(options) : v1::CreateJobRequest();
-  say("bedflow: " + (options.resume.empty() ? "case \"" + request.case_().name() + "\"" : "job " + target.id) + " on a server in " +
-      words(std::filesystem::absolute(target.data)));
+  say("bedflow: " + (options.resume.empty() ? "case \"" + request.case_().name() + "\"" : "job " + target.id) +
+      " on a server in " + words(std::filesystem::absolute(target.data)));
   EmbeddedServer server(target.data);
   const Connection connection(server.address());
   const auto job = options.resume.empty() ? create(connection, server, request) : resume(connection, target.id, options);

@@ -71,7 +71,9 @@ void add_server_verbs(CLI::App& app, Program& program) {
   const auto create_options = std::make_shared<CheckpointOptions>();
   verb = checkpoint->add_subcommand("create", "write one now; the job goes on");
   verb->add_option("job", create_options->job, "id of the job")->required();
-  verb->add_option("--timeout", create_options->timeout, "wait for it at most so long, s")->check(CLI::PositiveNumber)->capture_default_str();
+  verb->add_option("--timeout", create_options->timeout, "wait for it at most so long, s")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
   add_format(verb, create_options->format);
   on_call(verb, program, create_options, create_checkpoint);
 

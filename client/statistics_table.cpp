@@ -10,22 +10,44 @@ namespace bedflow::client {
 
 namespace {
 
-Cell mean_cell(const v1::Estimate& estimate) { return estimate.bins() > 0 ? Cell(estimate.mean()) : Cell(); }
-Cell half_cell(const v1::Estimate& estimate) { return estimate.has_half_width() ? Cell(estimate.half_width()) : Cell(); }
-Cell last_cell(const v1::Series& series) { return series.value_size() ? Cell(series.value(series.value_size() - 1)) : Cell(); }
+Cell mean_cell(const v1::Estimate& estimate) {
+  return estimate.bins() > 0 ? Cell(estimate.mean()) : Cell();
+}
+Cell half_cell(const v1::Estimate& estimate) {
+  return estimate.has_half_width() ? Cell(estimate.half_width()) : Cell();
+}
+Cell last_cell(const v1::Series& series) {
+  return series.value_size() ? Cell(series.value(series.value_size() - 1)) : Cell();
+}
 
 // A line a series, and a line a place of a profile.
 Table long_form(const v1::Statistics& statistics) {
   Table table({"name", "unit", "place_m", "samples", "last", "mean", "half_width", "bins", "deviation", "deviation_half_width"});
   for (const auto& one : statistics.series()) {
-    table.add({one.name(), one.unit(), {}, static_cast<std::uint64_t>(one.value_size()), last_cell(one), mean_cell(one.average()),
-               half_cell(one.average()), std::uint64_t{one.average().bins()}, mean_cell(one.deviation()), half_cell(one.deviation())});
+    table.add({one.name(),
+               one.unit(),
+               {},
+               static_cast<std::uint64_t>(one.value_size()),
+               last_cell(one),
+               mean_cell(one.average()),
+               half_cell(one.average()),
+               std::uint64_t{one.average().bins()},
+               mean_cell(one.deviation()),
+               half_cell(one.deviation())});
   }
   for (const auto& one : statistics.profiles()) {
     for (int i = 0; i < std::min(one.place_size(), one.average_size()); ++i) {
       const auto deviation = i < one.deviation_size() ? one.deviation(i) : v1::Estimate();
-      table.add({one.name(), one.unit(), one.place(i), {}, {}, mean_cell(one.average(i)), half_cell(one.average(i)),
-                 std::uint64_t{one.average(i).bins()}, mean_cell(deviation), half_cell(deviation)});
+      table.add({one.name(),
+                 one.unit(),
+                 one.place(i),
+                 {},
+                 {},
+                 mean_cell(one.average(i)),
+                 half_cell(one.average(i)),
+                 std::uint64_t{one.average(i).bins()},
+                 mean_cell(deviation),
+                 half_cell(deviation)});
     }
   }
   return table;
@@ -45,11 +67,12 @@ std::string for_people(const v1::Statistics& statistics) {
     const Terminal terminal(stdout);
     std::uint32_t bins = 0;
     for (const auto& estimate : one.average()) bins = std::max(bins, estimate.bins());
-    text += (text.empty() ? "" : "\n") + terminal.paint(Colour::bold, one.name()) + "  " + one.unit() + ", " + std::to_string(bins) +
-            (bins == 1 ? " bin of time\n" : " bins of time\n");
+    text += (text.empty() ? "" : "\n") + terminal.paint(Colour::bold, one.name()) + "  " + one.unit() + ", " +
+            std::to_string(bins) + (bins == 1 ? " bin of time\n" : " bins of time\n");
     Table table({"place / mm", "mean ± 95 %", "deviation ± 95 %"});
     for (int i = 0; i < std::min(one.place_size(), one.average_size()); ++i) {
-      table.add({1e3 * one.place(i), estimate_text(one.average(i)), i < one.deviation_size() ? estimate_text(one.deviation(i)) : "-"});
+      table.add(
+          {1e3 * one.place(i), estimate_text(one.average(i)), i < one.deviation_size() ? estimate_text(one.deviation(i)) : "-"});
     }
     text += table.text(Format::table);
   }

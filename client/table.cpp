@@ -30,7 +30,9 @@ std::string all_digits(double value) {
   return text.data();
 }
 
-bool is_number(const Cell& cell) { return std::holds_alternative<double>(cell) || std::holds_alternative<std::uint64_t>(cell); }
+bool is_number(const Cell& cell) {
+  return std::holds_alternative<double>(cell) || std::holds_alternative<std::uint64_t>(cell);
+}
 
 std::string plain(const Cell& cell) {
   return std::visit(Visitor{[](std::monostate) { return std::string("-"); }, [](const std::string& text) { return text; },
@@ -41,11 +43,12 @@ std::string plain(const Cell& cell) {
 }
 
 std::string json_cell(const Cell& cell) {
-  return std::visit(Visitor{[](std::monostate) { return std::string("null"); }, [](const std::string& text) { return json_quoted(text); },
-                            [](double value) { return std::isfinite(value) ? all_digits(value) : std::string("null"); },
-                            [](std::uint64_t value) { return std::to_string(value); },
-                            [](bool value) { return std::string(value ? "true" : "false"); }},
-                    cell);
+  return std::visit(
+      Visitor{[](std::monostate) { return std::string("null"); }, [](const std::string& text) { return json_quoted(text); },
+              [](double value) { return std::isfinite(value) ? all_digits(value) : std::string("null"); },
+              [](std::uint64_t value) { return std::to_string(value); },
+              [](bool value) { return std::string(value ? "true" : "false"); }},
+      cell);
 }
 
 std::string csv_cell(const Cell& cell) {

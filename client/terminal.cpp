@@ -53,7 +53,9 @@ std::string Terminal::paint(Colour colour, const std::string& text) const {
   return std::string("\033[") + codes[static_cast<std::size_t>(colour)] + "m" + text + "\033[0m";
 }
 
-void say(const std::string& line) { std::fputs((line + "\n").c_str(), stderr); }
+void say(const std::string& line) {
+  std::fputs((line + "\n").c_str(), stderr);
+}
 
 std::size_t display_width(const std::string& text) {
   std::size_t columns = 0;
@@ -94,6 +96,8 @@ std::string time_text(std::int64_t unix_nanos) {
   return text.data();
 }
 
-std::string number_text(double value) { return printed("%.6g", value); }
+std::string number_text(double value) {
+  return printed("%.6g", value);
+}
 
 }  // namespace bedflow::client

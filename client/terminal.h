@@ -31,7 +31,7 @@ std::size_t display_width(const std::string& text);  // columns of UTF-8 text wi
 
 // "1h 02m", "3m 05s", "12 s"; of a length of time in seconds.
 std::string duration_text(double seconds);
-std::string bytes_text(double bytes);           // "12.3 MiB"
+std::string bytes_text(double bytes);            // "12.3 MiB"
 std::string time_text(std::int64_t unix_nanos);  // local time "2026-01-31 13:05:09"; "-" for 0
 // Six significant digits, the shortest form.
 std::string number_text(double value);

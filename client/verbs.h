@@ -12,8 +12,8 @@
 namespace bedflow::client {
 
 struct Program {
-  std::string server;             // --server, BEDFLOW_SERVER, or the default
-  std::function<Exit()> verb;     // what was asked for
+  std::string server;          // --server, BEDFLOW_SERVER, or the default
+  std::function<Exit()> verb;  // what was asked for
 };
 
 void add_case_verbs(CLI::App& app, Program& program);    // init, validate, reference, explain
@@ -25,8 +25,10 @@ void add_server_verbs(CLI::App& app, Program& program);  // checkpoint, server
 
 // The verb's function is called once the whole line has been parsed.
 template <class Options>
-void on_call(CLI::App* verb, Program& program, std::shared_ptr<Options> options, Exit (*function)(const Program&, const Options&)) {
-  verb->callback([&program, options, function] { program.verb = [&program, options, function] { return function(program, *options); }; });
+void on_call(CLI::App* verb, Program& program, std::shared_ptr<Options> options,
+             Exit (*function)(const Program&, const Options&)) {
+  verb->callback(
+      [&program, options, function] { program.verb = [&program, options, function] { return function(program, *options); }; });
 }
 
 void add_format(CLI::App* verb, Format& format);

@@ -13,12 +13,19 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
 
 class Watch {
  public:
   Watch(const Connection& connection, const std::string& id, const WatchPlan& plan, const WatchCalls& calls, Interrupt& interrupt)
-      : connection_(connection), plan_(plan), calls_(calls), interrupt_(interrupt), sequence_(plan.after_sequence), from_now_(plan.from_now) {
+      : connection_(connection),
+        plan_(plan),
+        calls_(calls),
+        interrupt_(interrupt),
+        sequence_(plan.after_sequence),
+        from_now_(plan.from_now) {
     job_.set_id(id);
   }
 
@@ -68,7 +75,8 @@ class Watch {
     away_since_.reset();
     heard_ = true;
     wait_ms_ = 100;
-    if (response.has_event() && response.event().has_sequence() && response.event().sequence() <= sequence_) return;  // seen before
+    if (response.has_event() && response.event().has_sequence() && response.event().sequence() <= sequence_)
+      return;  // seen before
     if (response.has_job()) {
       job_ = response.job();
       if (!target_) target_ = job_.last_sequence();
@@ -98,7 +106,8 @@ class Watch {
                   duration_text(plan_.away_seconds));
     }
     if (away_since_ && seconds_since(*away_since_) > plan_.away_seconds) {
-      throw Failure(Exit::unreachable, "the server at " + connection_.address() + " stayed away for " + duration_text(plan_.away_seconds),
+      throw Failure(Exit::unreachable,
+                    "the server at " + connection_.address() + " stayed away for " + duration_text(plan_.away_seconds),
                     "start it again, then: bedflow watch " + job_.id() + " --after " + std::to_string(sequence_));
     }
     calls_.lost();

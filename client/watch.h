@@ -1,4 +1,5 @@
-// Following a job's events over a stream that may break: resumed from the last sequence number seen, nothing twice, nothing missed.
+// Following a job's events over a stream that may break: resumed from the last sequence number seen, nothing twice, nothing
+// missed.
 #pragma once
 
 #include <functional>

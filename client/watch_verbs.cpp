@@ -52,8 +52,9 @@ Exit wait(const Program& program, const WaitOptions& options) {
     std::string name = options.state;
     for (char& c : name) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
     if (!v1::JobState_Parse(name, &state) && !v1::JobState_Parse("STATE_" + name, &state)) {
-      throw Failure(Exit::usage, "--for " + options.state + " is no state of a job",
-                    "one of pending, starting, running, succeeded, suspending, suspended, cancelling, cancelled, recovering, failed");
+      throw Failure(
+          Exit::usage, "--for " + options.state + " is no state of a job",
+          "one of pending, starting, running, succeeded, suspending, suspended, cancelling, cancelled, recovering, failed");
     }
     plan.until_state = state;
   }
@@ -62,16 +63,20 @@ Exit wait(const Program& program, const WaitOptions& options) {
   const auto result = watch_job(connection, options.job, plan, calls, interrupt);
   if (result.end == WatchEnd::interrupted) return Exit::interrupted;
   if (result.end == WatchEnd::timed_out) {
-    throw Failure(Exit::timed_out, "the job " + options.job + " is still " + state_name(result.job.state()) + " after " +
-                                       number_text(*options.timeout) + " s", "bedflow watch " + options.job);
+    throw Failure(Exit::timed_out,
+                  "the job " + options.job + " is still " + state_name(result.job.state()) + " after " +
+                      number_text(*options.timeout) + " s",
+                  "bedflow watch " + options.job);
   }
   Table table({"id", "state"});
   table.add({result.job.id(), state_name(result.job.state())});
   print_message(result.job, table, options.format);
   if (result.end == WatchEnd::state_reached) return Exit::ok;
   if (plan.until_state) {
-    throw Failure(Exit::wrong_state, "the job " + options.job + " is " + state_name(result.job.state()) + " and will not be " +
-                                         state_name(*plan.until_state), "bedflow get " + options.job);
+    throw Failure(
+        Exit::wrong_state,
+        "the job " + options.job + " is " + state_name(result.job.state()) + " and will not be " + state_name(*plan.until_state),
+        "bedflow get " + options.job);
   }
   return exit_of(result.job);
 }
@@ -102,7 +107,8 @@ Exit logs_of_folder(const LogOptions& options) {
     v1::Event event;
     if (event.ParseFromString(record.payload)) print_log_event(event, options);
   });
-  if (!whole) throw Failure(Exit::corrupt, "the event log " + path.string() + " is damaged after byte " + std::to_string(reader.offset()));
+  if (!whole)
+    throw Failure(Exit::corrupt, "the event log " + path.string() + " is damaged after byte " + std::to_string(reader.offset()));
   return Exit::ok;
 }
 
@@ -129,7 +135,9 @@ void add_watch_verbs(CLI::App& app, Program& program) {
   verb->add_option("job", watch_options->job, "id of the job")->required();
   verb->add_option("--after", watch_options->after, "events after this sequence number");
   verb->add_flag("--history", watch_options->history, "all events from the first on");
-  verb->add_option("--away", watch_options->away, "how long the server may be away, s")->check(CLI::NonNegativeNumber)->capture_default_str();
+  verb->add_option("--away", watch_options->away, "how long the server may be away, s")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
   add_format(verb, watch_options->format);
   on_call(verb, program, watch_options, watch);
 
