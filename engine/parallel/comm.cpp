@@ -4,6 +4,7 @@
 #include <mpi.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <numeric>
 
 namespace bedflow {
@@ -30,22 +31,28 @@ std::vector<int> offsets_of(const std::vector<int>& counts) {
 
 }  // namespace
 
+// A process that no launcher started has nobody to talk to: MPI stays asleep, which saves it a helper process and a start.
 MpiSession::MpiSession(int* argc, char*** argv) {
-  MPI_Init(argc, argv);
+  const bool launched = std::getenv("OMPI_COMM_WORLD_SIZE") || std::getenv("PMIX_RANK") || std::getenv("PMI_RANK");
+  if (launched) MPI_Init(argc, argv);
 }
 MpiSession::~MpiSession() {
-  MPI_Finalize();
+  int started = 0;
+  MPI_Initialized(&started);
+  if (started) MPI_Finalize();
 }
 
-Comm::Comm(std::shared_ptr<const Handle> handle) : handle_(std::move(handle)) {
-  MPI_Comm_rank(handle_->comm, &rank_);
-  MPI_Comm_size(handle_->comm, &size_);
-}
+Comm::Comm(std::shared_ptr<const Handle> handle, int rank, int size) : handle_(std::move(handle)), rank_(rank), size_(size) {}
 Comm Comm::world() {
-  return Comm(std::make_shared<const Handle>(Handle{MPI_COMM_WORLD}));
+  int started = 0, rank = 0, size = 1;
+  MPI_Initialized(&started);
+  if (!started) return self();
+  MPI_Comm_rank(MPI_COMM_WORLD, &rank);
+  MPI_Comm_size(MPI_COMM_WORLD, &size);
+  return {std::make_shared<const Handle>(Handle{MPI_COMM_WORLD}), rank, size};
 }
 Comm Comm::self() {
-  return Comm(std::make_shared<const Handle>(Handle{MPI_COMM_SELF}));
+  return {nullptr, 0, 1};
 }
 
 double Comm::sum(double value) const {
@@ -72,12 +79,14 @@ void Comm::sum(std::span<double> values) const {
 }
 
 std::int64_t Comm::sum_before(std::int64_t value) const {
+  if (size_ == 1) return 0;
   std::int64_t before = 0;
   MPI_Exscan(&value, &before, 1, MPI_INT64_T, MPI_SUM, handle_->comm);
   return rank_ == 0 ? 0 : before;
 }
 
 void Comm::broadcast(std::span<std::byte> bytes, int from) const {
+  if (size_ == 1) return;
   MPI_Bcast(bytes.data(), static_cast<int>(bytes.size()), MPI_BYTE, from, handle_->comm);
 }
 std::string Comm::broadcast(const std::string& text, int from) const {
@@ -90,6 +99,7 @@ std::string Comm::broadcast(const std::string& text, int from) const {
 }
 
 std::vector<std::byte> Comm::gather(std::span<const std::byte> mine) const {
+  if (size_ == 1) return {mine.begin(), mine.end()};
   int count = static_cast<int>(mine.size());
   std::vector<int> counts(root() ? size_ : 0);
   MPI_Gather(&count, 1, MPI_INT, counts.data(), 1, MPI_INT, 0, handle_->comm);
@@ -103,11 +113,13 @@ std::vector<std::byte> Comm::gather(std::span<const std::byte> mine) const {
   return all;
 }
 std::vector<std::int64_t> Comm::gather_all(std::int64_t mine) const {
+  if (size_ == 1) return {mine};
   std::vector<std::int64_t> all(size_);
   MPI_Allgather(&mine, 1, MPI_INT64_T, all.data(), 1, MPI_INT64_T, handle_->comm);
   return all;
 }
 std::vector<double> Comm::gather_all(std::span<const double> mine) const {
+  if (size_ == 1) return {mine.begin(), mine.end()};
   const int count = static_cast<int>(mine.size());
   std::vector<int> counts(size_);
   MPI_Allgather(&count, 1, MPI_INT, counts.data(), 1, MPI_INT, handle_->comm);
@@ -122,6 +134,7 @@ void Comm::exchange(int to, std::span<const double> send, int from, std::vector<
     receive.assign(send.begin(), send.end());
     return;
   }
+  if (size_ == 1) return receive.clear();
   MPI_Request request = MPI_REQUEST_NULL;
   if (to >= 0) MPI_Isend(send.data(), static_cast<int>(send.size()), MPI_DOUBLE, to, tag, handle_->comm, &request);
   receive.clear();
@@ -140,12 +153,14 @@ void Comm::exchange(int to, std::span<const double> send, int from, std::span<do
     std::copy(send.begin(), send.end(), receive.begin());
     return;
   }
+  if (size_ == 1) return;
   MPI_Sendrecv(send.data(), static_cast<int>(send.size()), MPI_DOUBLE, to < 0 ? MPI_PROC_NULL : to, tag, receive.data(),
                static_cast<int>(receive.size()), MPI_DOUBLE, from < 0 ? MPI_PROC_NULL : from, tag, handle_->comm,
                MPI_STATUS_IGNORE);
 }
 
 std::vector<std::vector<double>> Comm::exchange_all(const std::vector<std::vector<double>>& messages) const {
+  if (size_ == 1) return messages;
   std::vector<int> send_counts(size_), receive_counts(size_);
   std::vector<double> send, receive;
   for (int r = 0; r < size_; ++r) {
@@ -166,11 +181,11 @@ std::vector<std::vector<double>> Comm::exchange_all(const std::vector<std::vecto
 }
 
 void Comm::barrier() const {
-  MPI_Barrier(handle_->comm);
+  if (size_ > 1) MPI_Barrier(handle_->comm);
 }
 void Comm::abort(int exit_code) const {
-  MPI_Abort(handle_->comm, exit_code);
-  std::abort();
+  if (size_ > 1) MPI_Abort(handle_->comm, exit_code);
+  std::_Exit(exit_code);
 }
 
 }  // namespace bedflow

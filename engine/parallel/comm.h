@@ -1,4 +1,5 @@
-// The ranks of a run and what they say to each other. One type, of size 1 in serial; the only mpi.h is in comm.cpp.
+// The ranks of a run and what they say to each other. One type; with one rank nothing of MPI is called. The only mpi.h is in
+// comm.cpp.
 #pragma once
 
 #include <cstddef>
@@ -10,7 +11,7 @@
 
 namespace bedflow {
 
-// Starts MPI for the life of main(); errors of MPI end all ranks.
+// Starts MPI for the life of main() in a process that mpirun (or srun) launched; errors of MPI end all ranks.
 class MpiSession {
  public:
   MpiSession(int* argc, char*** argv);
@@ -61,7 +62,7 @@ class Comm {
 
  private:
   struct Handle;
-  explicit Comm(std::shared_ptr<const Handle> handle);
+  Comm(std::shared_ptr<const Handle> handle, int rank, int size);
   std::shared_ptr<const Handle> handle_;
   int rank_ = 0;
   int size_ = 1;
