@@ -12,7 +12,7 @@ namespace {
 using Faces = std::array<std::array<Boundary, 2>, 3>;
 
 struct Block {
-  Block(Int3 cells, std::array<bool, 3> periodic, const Faces& faces, Comm comm = Comm::world())
+  Block(Int3 cells, std::array<bool, 3> periodic, const Faces& faces, const Comm& comm = Comm::world())
       : decomposition(comm, cells, {0.1 * cells[0], 0.1 * cells[1], 0.1 * cells[2]}, periodic),
         grid(decomposition),
         halo(decomposition, grid, timer),
@@ -94,7 +94,7 @@ TEST(Boundaries, GhostsGiveTheWallItsVelocityAndTheOutflowItsPressure) {
 
 // One random problem: ε and mobility of a wide range on the faces that are solved.
 struct Problem {
-  Problem(Int3 cells, std::array<bool, 3> periodic, const Faces& faces, Comm comm = Comm::world())
+  Problem(Int3 cells, std::array<bool, 3> periodic, const Faces& faces, const Comm& comm = Comm::world())
       : block(cells, periodic, faces, comm),
         pressure(block.decomposition, block.grid, block.halo, block.boundaries),
         fraction(block.grid, 1),

@@ -11,7 +11,8 @@
 namespace bedflow {
 
 struct GasBox {
-  GasBox(Int3 cells, Vec3 size, std::array<bool, 3> periodic, const GasSetup& setup, Comm comm = Comm::self(), int tall = -1)
+  GasBox(Int3 cells, Vec3 size, std::array<bool, 3> periodic, const GasSetup& setup, const Comm& comm = Comm::self(),
+         int tall = -1)
       : decomposition(comm, cells, size, periodic, tall),
         grid(decomposition),
         halo(decomposition, grid, timer),
@@ -25,7 +26,7 @@ struct GasBox {
 
   // One step; with: whether the exchange with particles counts.
   GasOutcome step(double dt, bool with_exchange = false) {
-    const GasOutcome outcome = simple.advance(state, with_exchange ? &exchange : nullptr, time, dt);
+    GasOutcome outcome = simple.advance(state, with_exchange ? &exchange : nullptr, time, dt);
     if (outcome.converged) time += dt;
     return outcome;
   }
