@@ -12,11 +12,6 @@
 #include "support/case_faults.h"
 
 namespace bedflow {
-
-void PrintTo(const CaseFault& fault, std::ostream* out) {
-  *out << fault.path << ": " << fault.text;
-}
-
 namespace {
 
 using testing::AllOf;

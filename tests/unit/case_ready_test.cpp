@@ -13,11 +13,6 @@
 #include "support/case_faults.h"
 
 namespace bedflow {
-
-void PrintTo(const CaseFault& fault, std::ostream* out) {
-  *out << fault.path << ": " << fault.text;
-}
-
 namespace {
 
 using testing::Each;
@@ -146,6 +141,7 @@ TEST(Presets, AreRefusedForWhatIsNotBuiltYetAndForNothingElse) {
     for (const ReadyCase& preset : ready_presets()) {
       const auto faults = check_case(ready_case(bed, preset.name));
       std::vector<std::string> paths;
+      paths.reserve(faults.size());
       for (const CaseFault& fault : faults) paths.push_back(fault.path);
       EXPECT_THAT(paths, UnorderedElementsAreArray(expected.at(std::string(preset.name)))) << bed << " " << preset.name;
       EXPECT_THAT(faults, Each(Field(&CaseFault::text, StartsWith("not built yet: "))));

@@ -9,17 +9,9 @@
 #include "support/case_faults.h"
 
 namespace bedflow {
-
-void PrintTo(const CaseFault& fault, std::ostream* out) {
-  *out << fault.path << ": " << fault.text;
-}
-
 namespace {
 
-using testing::AllOf;
 using testing::ElementsAre;
-using testing::Field;
-using testing::HasSubstr;
 using testing::IsEmpty;
 
 using Change = std::function<void(v1::Case&)>;

@@ -14,11 +14,6 @@
 #include "support/case_faults.h"
 
 namespace bedflow {
-
-void PrintTo(const CaseFault& fault, std::ostream* out) {
-  *out << fault.path << ": " << fault.text;
-}
-
 namespace {
 
 using google::protobuf::Descriptor;
@@ -26,7 +21,6 @@ using google::protobuf::FieldDescriptor;
 using google::protobuf::Message;
 using testing::AllOf;
 using testing::Contains;
-using testing::Field;
 using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
