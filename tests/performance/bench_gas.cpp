@@ -60,7 +60,7 @@ class MovingBed {
     }
   }
   GasOutcome step() {
-    const GasOutcome outcome = simple_.advance(state_, &exchange_, time_, bed_.dt);
+    GasOutcome outcome = simple_.advance(state_, &exchange_, time_, bed_.dt);
     time_ += bed_.dt;
     return outcome;
   }
