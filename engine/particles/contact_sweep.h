@@ -45,9 +45,7 @@ std::size_t find_touching(PairList& list, std::size_t first, std::size_t last, c
     const bool touch = dot(apart, apart) < diameter * diameter;
     touching[count] = static_cast<std::uint32_t>(p);
     count += touch;
-    if constexpr (history) {
-      if (!touch) list.pair_history[p] = {};
-    }
+    if constexpr (history) list.pair_history[p] *= touch;
   }
   return count;
 }
