@@ -331,8 +331,10 @@ v1::Checkpoint Jobs::create_checkpoint(const std::string& id, std::chrono::durat
   const auto before = live_.at(id).attempt.last_sequence();
   live_.at(id).attempt.folder().command(v1::Control::CHECKPOINT);
   const auto live = [&] { return live_.find(id); };
-  const bool answered = changed_.wait_for(
-      guard, limit, [&] { return live() == live_.end() || live()->second.attempt.checkpoint().sequence() > before; });
+  const bool answered = changed_.wait_for(guard, limit, [&] {
+    return stopping_ || live() == live_.end() || live()->second.attempt.checkpoint().sequence() > before;
+  });
+  if (stopping_) throw Refusal(Refused::going_down, "the server goes down; the checkpoint will still be written");
   if (!answered) {
     throw Refusal(Refused::timed_out, "no checkpoint of " + id + " within the time given; it will come with the next step",
                   "bedflow checkpoint list " + id);
@@ -388,6 +390,12 @@ v1::ServerInfo Jobs::info() {
 bool Jobs::is_idle() {
   const std::lock_guard guard(mutex_);
   return live_.empty() && catalogue_.count({v1::PENDING, v1::RECOVERING}) == 0;
+}
+
+void Jobs::stop_waiting() {
+  const std::lock_guard guard(mutex_);
+  stopping_ = true;
+  changed_.notify_all();
 }
 
 }  // namespace bedflow::server

@@ -49,7 +49,8 @@ class Jobs {
   // that have something new for their watchers.
   std::set<std::string> advance();
   void poke() { notifier_.poke(); }
-  bool is_idle();  // nothing waits, nothing runs
+  bool is_idle();       // nothing waits, nothing runs
+  void stop_waiting();  // calls that wait for an engine are answered now: the server goes down
 
  private:
   struct Live {  // a job with an attempt
@@ -90,6 +91,7 @@ class Jobs {
   std::map<std::string, std::weak_ptr<StateLog>> changes_;
   std::map<std::string, std::chrono::steady_clock::time_point> not_before_;  // of jobs that are tried again
   std::set<std::string> news_;
+  bool stopping_ = false;
 };
 
 }  // namespace bedflow::server

@@ -118,7 +118,11 @@ int serve(const Options& options) {
                [&] { return options.idle_exit && service.quiet() > patience && watchers.count() == 0 && jobs.is_idle(); });
   spdlog::info("going down; what runs goes on running");
   watchers.drain();
-  server->Shutdown(std::chrono::system_clock::now() + 2s);
+  jobs.stop_waiting();
+  // Idle connections are not waited for, only calls.
+  const auto deadline = std::chrono::steady_clock::now() + 2s;
+  while (service.calls() + watchers.count() > 0 && std::chrono::steady_clock::now() < deadline) std::this_thread::sleep_for(5ms);
+  server->Shutdown(std::chrono::system_clock::now() + 50ms);
   ending = true;
   jobs.poke();
   supervisor.join();

@@ -22,6 +22,7 @@ enum class Refused {
   checkpoint_corrupt,    //
   log_damaged,           // a record in the middle of a job's log
   disk_full,             //
+  going_down,            // the server, not the job
   backend_error,         // the engine could not be asked
 };
 

@@ -43,6 +43,8 @@ Code code_of(Refused why) {
       return {grpc::StatusCode::DATA_LOSS, "LOG_DAMAGED"};
     case Refused::disk_full:
       return {grpc::StatusCode::RESOURCE_EXHAUSTED, "DISK_FULL"};
+    case Refused::going_down:
+      return {grpc::StatusCode::UNAVAILABLE, "GOING_DOWN"};
     case Refused::backend_error:
       return {grpc::StatusCode::INTERNAL, "BACKEND_ERROR"};
   }
@@ -86,8 +88,9 @@ grpc::Status status_of(const Refusal& refusal) {
 
 JobService::Unary* JobService::answer(Context* context, Pace pace, std::function<void()> call) {
   last_call_ = std::chrono::steady_clock::now();
+  ++calls_;
   Unary* reactor = context->DefaultReactor();
-  boost::asio::post(pace == Pace::quick ? quick_ : slow_, [reactor, call = std::move(call)] {
+  boost::asio::post(pace == Pace::quick ? quick_ : slow_, [this, reactor, call = std::move(call)] {
     grpc::Status status;
     try {
       call();
@@ -97,6 +100,7 @@ JobService::Unary* JobService::answer(Context* context, Pace pace, std::function
       status = status_of_failure(failure);
     }
     reactor->Finish(status);
+    --calls_;
   });
   return reactor;
 }

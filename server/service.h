@@ -27,6 +27,7 @@ class JobService final : public v1::JobService::CallbackService {
   ~JobService() override { wait_for_calls(); }
 
   void wait_for_calls();                              // after the gRPC server's shutdown
+  std::size_t calls() const { return calls_; }        // in progress, streams not counted
   std::chrono::steady_clock::duration quiet() const;  // since the last call
 
  private:
@@ -54,6 +55,7 @@ class JobService final : public v1::JobService::CallbackService {
   const std::filesystem::path engine_;
   const std::string address_;
   std::atomic<std::chrono::steady_clock::time_point> last_call_ = std::chrono::steady_clock::now();
+  std::atomic<std::size_t> calls_ = 0;
   boost::asio::thread_pool quick_{4};
   boost::asio::thread_pool slow_{16};
 };

@@ -69,7 +69,8 @@ TEST_F(Calls, AnInvalidCaseListsAllFaultsByPath) {
   const auto status = create(request, response);
   expect_refused(status, StatusCode::INVALID_ARGUMENT, "INVALID_CASE");
   std::vector<std::string> paths;
-  for (const auto& fault : detail_of(status).faults()) paths.push_back(fault.path());
+  const auto detail = detail_of(status);
+  for (const auto& fault : detail.faults()) paths.push_back(fault.path());
   EXPECT_THAT(paths, testing::IsSupersetOf({"gas.density", "gas.viscosity", "gravity", "spec.ranks"}));
 }
 

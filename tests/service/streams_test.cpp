@@ -5,6 +5,7 @@
 #include <future>
 #include <thread>
 
+#include "folder.h"
 #include "service_fixture.h"
 
 namespace bedflow::test {
@@ -67,7 +68,8 @@ TEST_F(Streams, TheStreamOfAFinalJobReplaysItsHistoryAndEnds) {
   wait_for(id, v1::SUCCEEDED);
   std::uint64_t expected = 0;
   for (const auto& response : watch(stub(), id, 0, [](const auto&) { return false; })) {
-    if (response.has_event()) EXPECT_EQ(response.event().sequence(), ++expected);
+    if (!response.has_event()) continue;
+    EXPECT_EQ(response.event().sequence(), ++expected);
   }
   EXPECT_EQ(expected, job(id).last_sequence());
   EXPECT_TRUE(status_of_watch(id, 0).ok());
@@ -81,7 +83,8 @@ TEST_F(Streams, ALongHistoryIsReplayedWholeFromAnyToken) {
   for (const std::uint64_t after : {std::uint64_t{0}, std::uint64_t{1}, std::uint64_t{1000}, last - 1, last}) {
     std::uint64_t expected = after;
     for (const auto& response : watch(stub(), id, after, [](const auto&) { return false; })) {
-      if (response.has_event()) ASSERT_EQ(response.event().sequence(), ++expected);
+      if (!response.has_event()) continue;
+      ASSERT_EQ(response.event().sequence(), ++expected);
     }
     EXPECT_EQ(expected, last);
   }
@@ -140,6 +143,23 @@ TEST_F(Streams, AServerThatGoesDownEndsItsStreamsWithTheToken) {
   const auto status = ended.get();
   EXPECT_EQ(status.error_code(), StatusCode::UNAVAILABLE);
   EXPECT_THAT(status.error_message(), testing::HasSubstr("after_sequence"));
+}
+
+TEST_F(Streams, AServerThatGoesDownAnswersWhoeverWaitsForACheckpoint) {
+  const auto id = submit(job_of(100, "freeze_at=5"));
+  ASSERT_TRUE(has_reached(id, 4));
+  auto ended = std::async(std::launch::async, [&] {
+    v1::CreateCheckpointRequest request;
+    request.set_id(id);
+    v1::Checkpoint checkpoint;
+    return call(&v1::JobService::Stub::CreateCheckpoint, request, checkpoint);
+  });
+  ASSERT_TRUE(holds_within(std::chrono::seconds(10), [&] {
+    v1::Control control;
+    return server::read_message(server_.folder(id) / "control.txtpb", control) && control.command() == v1::Control::CHECKPOINT;
+  }));
+  EXPECT_EQ(server_.stop(), 0);
+  expect_refused(ended.get(), StatusCode::UNAVAILABLE, "GOING_DOWN");
 }
 
 class QuickBookmarks : public Streams {
