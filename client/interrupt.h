@@ -1,11 +1,11 @@
-// Ctrl-C and SIGTERM as a question to ask, so that a watch can end in order.
+// Ctrl-C, SIGTERM and a terminal that goes away (SIGHUP) as a question to ask, so that a watch can end in order.
 #pragma once
 
 #include <csignal>
 
 namespace bedflow::client {
 
-// Made before any other thread starts: blocks both signals for this thread and those that come after. A child does not
+// Made before any other thread starts: blocks these signals for this thread and those that come after. A child does not
 // inherit it (child.h).
 class Interrupt {
  public:
@@ -13,6 +13,7 @@ class Interrupt {
     sigemptyset(&signals_);
     sigaddset(&signals_, SIGINT);
     sigaddset(&signals_, SIGTERM);
+    sigaddset(&signals_, SIGHUP);
     pthread_sigmask(SIG_BLOCK, &signals_, &before_);
   }
   ~Interrupt() { pthread_sigmask(SIG_SETMASK, &before_, nullptr); }

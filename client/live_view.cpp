@@ -40,6 +40,7 @@ class LiveView {
     const auto& event = response.event();
     if (format_ == Format::json || format_ == Format::jsonl) print_data(json_text(event, false));
     if (event.has_progress()) display_.update(event.progress());
+    if (event.has_stopped()) return;  // the state that follows says it
     if (const auto line = event_line(event); !line.empty()) display_.message(line);
   }
   void note(const std::string& line) { display_.message(display_.terminal().paint(Colour::yellow, line)); }

@@ -47,6 +47,10 @@ int run(int argc, char** argv) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     const bool asked_for_help = error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success);
+    const auto words = app.remaining();
+    if (!asked_for_help && app.get_subcommands().empty() && !words.empty()) {
+      throw Failure(Exit::usage, "there is no verb \"" + words.front() + "\"", "bedflow --help");
+    }
     app.exit(error);
     return static_cast<int>(asked_for_help ? Exit::ok : Exit::usage);
   }

@@ -65,26 +65,25 @@ std::optional<double> SpeedGauge::steps_per_second() const {
 }
 
 std::string progress_line(const v1::Progress& progress, const SpeedGauge& speed, int width, bool unicode) {
-  const double share = share_done(progress);
-  const std::string percent = fixed(100 * share, 1) + " %";
-  std::vector<std::string> parts = {percent};
-  const bool settling = progress.phase() == "settling";
-  parts.push_back(std::string(settling ? "settling " : "") + "t " + fixed(progress.time(), 4) + " of " +
-                  number_text(progress.end_time()) + " s");
-  const double left = eta(progress, speed);
-  parts.push_back("ETA " + (std::isfinite(left) ? duration_text(left) : std::string("?")));
-  parts.push_back("step " + std::to_string(progress.step()));
+  constexpr int widest_bar = 30, narrowest_bar = 8, brackets = 3;
+  const double share = share_done(progress), left = eta(progress, speed);
+  const std::string gap = width < 100 ? " " : "  ";
+  const std::string phase = progress.phase() == "settling" ? "settling " : "";
+  std::vector<std::string> parts = {fixed(100 * share, 1) + " %",
+                                    phase + "t " + fixed(progress.time(), 4) + "/" + number_text(progress.end_time()) + " s",
+                                    "ETA " + (std::isfinite(left) ? duration_text(left) : std::string("?"))};
   if (const auto rate = speed.simulated_per_wall()) parts.push_back(rate_text(*rate) + " s/s");
+  parts.push_back("step " + std::to_string(progress.step()));
   if (const auto rate = speed.steps_per_second()) parts.push_back(rate_text(*rate) + " steps/s");
+  const int room = width < 60 ? width : width - narrowest_bar - brackets;
   std::string text = parts[0];
-  std::size_t used = 1;
-  for (; used < parts.size(); ++used) {
-    if (display_width(text) + 2 + display_width(parts[used]) > static_cast<std::size_t>(width)) break;
-    text += "  " + parts[used];
+  for (std::size_t i = 1; i < parts.size(); ++i) {
+    if (display_width(text + gap + parts[i]) > static_cast<std::size_t>(room)) break;
+    text += gap + parts[i];
   }
-  const int room = width - static_cast<int>(display_width(text)) - 4;
-  if (used == parts.size() && room >= 8) text = "[" + bar(share, std::min(room, 30), unicode) + "] " + text;
-  return text;
+  if (width < 60) return text;
+  const int cells = std::min(width - static_cast<int>(display_width(text)) - brackets, widest_bar);
+  return "[" + bar(share, cells, unicode) + "] " + text;
 }
 
 void ProgressDisplay::update(const v1::Progress& progress) {

@@ -25,7 +25,8 @@ class SpeedGauge {
   std::deque<Point> points_;
 };
 
-// "[#####-----]  43.2 %  step 12345  t 0.216/0.5 s  ..." in at most `width` columns; what matters least is left out first.
+// "[#####-----] 43.2 %  t 0.2160/0.5 s  ETA 12 s  0.0123 s/s  step 12345  ..." in at most `width` columns; what matters least is
+// left out first.
 std::string progress_line(const v1::Progress& progress, const SpeedGauge& speed, int width, bool unicode);
 
 class ProgressDisplay {
