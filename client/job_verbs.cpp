@@ -158,7 +158,8 @@ void add_job_verbs(CLI::App& app, Program& program) {
   auto* verb = app.add_subcommand("submit", "hand a case to the server; prints the id of the job");
   verb->add_option("case", submit_options->where, "file, - for stdin, or a ready case");
   add_job_options(verb, *submit_options);
-  verb->add_option("--start-from", submit_options->start_from, "start from a checkpoint of a job")->type_name("JOB[@STEP]");
+  verb->add_option("--start-from,--from", submit_options->start_from, "start from a checkpoint of a job")
+      ->type_name("JOB[@STEP]");
   verb->add_option("--request-id", submit_options->request_id, "8 to 64 letters, digits and -; the same id gives the same job");
   verb->add_flag("--validate-only", submit_options->validate_only, "every check, the plan and the estimate; no job");
   verb->add_flag("--watch", submit_options->watch, "follow the job");

@@ -33,7 +33,7 @@ class LiveView {
       state_ = response.job().state();
       if (is_final(*state_)) display_.finish();
       display_.message(state_line(display_.terminal(), response.job()));
-      if (!response.has_event() && response.job().has_progress() && !is_final(*state_))
+      if (!response.has_event() && response.job().has_progress() && *state_ == v1::RUNNING)
         display_.update(response.job().progress());
     }
     if (!response.has_event()) return;

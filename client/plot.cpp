@@ -69,7 +69,8 @@ class Panel {
   Panel(std::string name, std::string title) : block_("$" + std::move(name)), title_(std::move(title)) {}
 
   void axes(const std::string& x_label, const std::string& y_label) {
-    head_ += "set title " + gnuplot_quoted(title_) + " font \",15\"\nset xlabel " + x_label + " offset 0,0.4\nset ylabel " + y_label + "\n";
+    head_ += "set title " + gnuplot_quoted(title_) + " font \",15\"\nset xlabel " + x_label + " offset 0,0.4\nset ylabel " +
+             y_label + "\n";
   }
   // Starts a block of data; returns its name.
   std::string block(const std::string& rows) {

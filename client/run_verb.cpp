@@ -90,7 +90,7 @@ void tell_where(const v1::Job& job, const EmbeddedServer& server, Exit exit) {
     return;
   }
   say("what it said: bedflow logs " + folder);
-  say("go on:        bedflow run --resume " + words(server.data() / job.id()));
+  if (job.state() != v1::STATE_CANCELLED) say("go on:        bedflow run --resume " + words(server.data() / job.id()));
 }
 
 Exit run(const Program&, const RunOptions& options) {
