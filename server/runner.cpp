@@ -31,7 +31,8 @@ Launch engine_launch(const RunnerOptions& options) {
   if (options.ranks > 1) {
     launch.command = {options.mpirun, "-n", std::to_string(options.ranks), "--oversubscribe", "--bind-to", "none"};
     launch.environment = {"OMPI_ALLOW_RUN_AS_ROOT=1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1"};
-    if (options.ranks > std::thread::hardware_concurrency()) launch.environment.emplace_back("OMPI_MCA_mpi_yield_when_idle=1");
+    // Ranks that fill the machine leave it to others while they wait; a core to spare would make this a loss.
+    if (options.ranks >= std::thread::hardware_concurrency()) launch.environment.emplace_back("OMPI_MCA_mpi_yield_when_idle=1");
   }
   launch.command.insert(launch.command.end(), {options.engine, options.folder, "--epoch", std::to_string(options.epoch)});
   if (options.from_step) launch.command.insert(launch.command.end(), {"--from", std::to_string(*options.from_step)});

@@ -117,6 +117,7 @@ class Engine {
   }
 
   void begin(double end) {
+    std::ofstream(folder_ / "heartbeat").close();
     v1::Event event;
     event.mutable_started()->set_ranks(spec_.ranks());
     event.mutable_started()->set_step(step_);
@@ -136,7 +137,7 @@ class Engine {
   }
 
   void report() {
-    std::ofstream(folder_ / "heartbeat") << step_;
+    fs::last_write_time(folder_ / "heartbeat", fs::file_time_type::clock::now());
     v1::Event event;
     event.mutable_progress()->set_step(step_);
     event.mutable_progress()->set_time(time());
