@@ -7,7 +7,7 @@
 namespace bedflow::server {
 namespace {
 
-constexpr const char* kSchema = R"(
+constexpr const char* schema = R"(
   CREATE TABLE jobs (
     number INTEGER PRIMARY KEY AUTOINCREMENT,
     id TEXT NOT NULL UNIQUE,
@@ -135,7 +135,7 @@ Catalogue::Catalogue(const std::filesystem::path& file) {
   if (version.number(0) > 1) throw std::runtime_error("catalogue: " + file.string() + " was written by a newer bedflowd");
   if (version.number(0) == 1) return;
   Transaction transaction(database);
-  run(database, kSchema);
+  run(database, schema);
   transaction.commit();
 }
 

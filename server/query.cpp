@@ -20,7 +20,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr std::uint32_t kMostParticles = 200'000;  // 16 bytes each: below gRPC's default of 4 MiB an answer
+constexpr std::uint32_t most_particles_sent = 200'000;  // 16 bytes each: below gRPC's default of 4 MiB an answer
 
 Answer ask_for_snapshot(const std::filesystem::path& engine, const std::filesystem::path& file, std::uint32_t most) {
   return ask({engine, "--snapshot", file, "--most", std::to_string(most)}, 60s, 256 << 20);
@@ -77,7 +77,7 @@ v1::Snapshot snapshot(const std::filesystem::path& engine, const JobFolder& fold
         "job " + request.id() + " has no checkpoint" + (request.has_step() ? " of step " + std::to_string(request.step()) : ""),
         list);
   }
-  const auto most = request.most_particles() == 0 ? kMostParticles : std::min(request.most_particles(), kMostParticles);
+  const auto most = request.most_particles() == 0 ? most_particles_sent : std::min(request.most_particles(), most_particles_sent);
   std::string faults;
   for (const auto step : steps) {
     const Answer answer = ask_for_snapshot(engine, folder.checkpoint(step), most);

@@ -17,8 +17,8 @@
 namespace bedflow::server {
 namespace {
 
-constexpr int kTaken = 75;         // EX_TEMPFAIL
-constexpr int kCannotStart = 127;  // as a shell says it
+constexpr int taken_code = 75;          // EX_TEMPFAIL
+constexpr int cannot_start_code = 127;  // as a shell says it
 
 // Left open on purpose: the lock lives as long as anyone who has inherited it.
 bool take_lock(const JobFolder& folder, std::uint32_t epoch) {
@@ -69,17 +69,17 @@ int run_attempt(const RunnerOptions& options) {
     std::filesystem::create_directories(folder.attempt(options.epoch));
     if (!take_lock(folder, options.epoch)) {
       std::fprintf(stderr, "attempt %u of %s is run by another runner\n", options.epoch, options.folder.c_str());
-      return kTaken;
+      return taken_code;
     }
   }
   if (const auto epochs = folder.epochs(); !epochs.empty() && epochs.back() > options.epoch) {
     std::fprintf(stderr, "attempt %u of %s has been replaced by attempt %u\n", options.epoch, options.folder.c_str(),
                  epochs.back());
-    return kTaken;
+    return taken_code;
   }
   const Launch engine = engine_launch(options);
   write_runner(folder, options, engine.command);
-  int exit_code = kCannotStart;
+  int exit_code = cannot_start_code;
   try {
     exit_code = wait_for_exit(launch(engine));
   } catch (const std::exception& failure) {

@@ -16,10 +16,10 @@ namespace {
 using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
-constexpr auto kPatience = 200ms;        // between two looks when nothing is told
-constexpr auto kEndPatience = 20ms;      // while an engine that has said its last word goes down
-constexpr auto kLongestEnd = 15s;        // that this may take
-constexpr std::int64_t kQueueLook = 64;  // waiting jobs that are considered in one round
+constexpr auto patience = 200ms;         // between two looks when nothing is told
+constexpr auto end_patience = 20ms;      // while an engine that has said its last word goes down
+constexpr auto longest_end = 15s;        // that this may take
+constexpr std::int64_t queue_look = 64;  // waiting jobs that are considered in one round
 
 // The first retry comes at once, the next after 2, 4, 8 … 60 s.
 Clock::duration pause_before(std::uint32_t retry) {
@@ -56,7 +56,7 @@ std::set<std::string> Jobs::advance() {
     const std::lock_guard guard(mutex_);
     for (const auto& [id, live] : live_) ending = ending || live.stopped_at;
   }
-  notifier_.wait(ending ? kEndPatience : kPatience);
+  notifier_.wait(ending ? end_patience : patience);
   const std::lock_guard guard(mutex_);
   executor_.reap();
   for (auto entry = live_.begin(); entry != live_.end();) {
@@ -82,7 +82,7 @@ void Jobs::look_at(Live& live) {
     attempt.folder().command(last.command(), last.skip_checkpoint());
   }
   if (attempt.stopped() && !live.stopped_at) live.stopped_at = Clock::now();
-  if (live.stopped_at && Clock::now() - *live.stopped_at > kLongestEnd) executor_.kill(attempt.folder(), attempt.epoch());
+  if (live.stopped_at && Clock::now() - *live.stopped_at > longest_end) executor_.kill(attempt.folder(), attempt.epoch());
   if (!attempt.stopped() && attempt.silence() > settings_.heartbeat_limit) {
     live.heartbeat_lost = true;
     executor_.kill(attempt.folder(), attempt.epoch());
@@ -114,7 +114,7 @@ void Jobs::end(Live& live) {
 void Jobs::start_waiting() {
   std::uint32_t used = 0;
   for (const auto& [id, live] : live_) used += live.record.job.spec().ranks();
-  for (auto& record : catalogue_.in_states({v1::PENDING, v1::RECOVERING}, kQueueLook)) {
+  for (auto& record : catalogue_.in_states({v1::PENDING, v1::RECOVERING}, queue_look)) {
     const auto pause = not_before_.find(record.job.id());
     if (pause != not_before_.end() && Clock::now() < pause->second) continue;
     used += record.job.spec().ranks();

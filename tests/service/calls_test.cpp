@@ -45,6 +45,7 @@ TEST_F(Calls, SimultaneousRetriesMakeOneJob) {
   std::vector<std::string> ids(8);
   {
     std::vector<std::jthread> clients;
+    clients.reserve(ids.size());
     for (auto& id : ids) clients.emplace_back([&] { id = submit(request); });
   }
   EXPECT_EQ(std::set<std::string>(ids.begin(), ids.end()).size(), 1u);
@@ -239,7 +240,7 @@ TEST_F(Calls, BytesThatAreNoMessageDoNoHarm) {
 // ------------------------------------------------------------------------------------------------- start of the server
 
 std::string output_of_start(const std::vector<std::string>& arguments, int& exit_code) {
-  std::vector<std::string> command = {kServer};
+  std::vector<std::string> command = {server_program};
   command.insert(command.end(), arguments.begin(), arguments.end());
   const auto answer = server::ask(command, std::chrono::seconds(10), 1 << 20);
   exit_code = answer.exit_code;

@@ -187,7 +187,7 @@ class MissingEngine : public testing::Test {};
 
 TEST_F(MissingEngine, IsABackendErrorOfTheCall) {
   const TemporaryFolder folder;
-  ServerProcess server(kServer, folder.path() / "data", "/nonexistent/bedflow-engine");
+  ServerProcess server(server_program, folder.path() / "data", "/nonexistent/bedflow-engine");
   grpc::ClientContext context;
   v1::CreateJobResponse response;
   struct Cases : ServiceTest {

@@ -12,12 +12,12 @@
 
 namespace bedflow::test {
 
-inline const std::string kServer = BEDFLOW_BIN_DIR "/bedflowd";
+inline const std::string server_program = BEDFLOW_BIN_DIR "/bedflowd";
 
 class ServiceTest : public testing::Test {
  protected:
   explicit ServiceTest(std::vector<std::string> arguments = {})
-      : server_(kServer, folder_.path() / "data", BEDFLOW_FAKE_ENGINE, std::move(arguments)) {}
+      : server_(server_program, folder_.path() / "data", BEDFLOW_FAKE_ENGINE, std::move(arguments)) {}
 
   // A good case of so many steps for the fake engine; `asks` as in fake_engine.cpp.
   static v1::CreateJobRequest job_of(int steps, const std::string& asks = "") {
