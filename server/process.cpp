@@ -146,7 +146,7 @@ Answer ask(const std::vector<std::string>& command, std::chrono::milliseconds li
   }
   const bool too_much = answer.output.size() + answer.error.size() > most_bytes;
   if (too_much || !has_ended_by(child, deadline)) {
-    answer.timed_out = Clock::now() >= deadline;
+    answer.timed_out = !too_much;
     ::kill(child, SIGKILL);
   }
   answer.exit_code = wait_for_exit(child);
