@@ -91,12 +91,15 @@ std::string Table::json_row(const std::vector<Cell>& row) const {
 
 std::string Table::csv() const {
   std::string text;
-  for (std::size_t i = 0; i < columns_.size(); ++i) text += (i ? "," : "") + csv_cell(columns_[i]);
-  text += "\n";
-  for (const auto& row : rows_) {
-    for (std::size_t i = 0; i < row.size(); ++i) text += (i ? "," : "") + csv_cell(row[i]);
-    text += "\n";
-  }
+  const auto add_line = [&](const std::vector<std::string>& cells) {
+    for (std::size_t i = 0; i < cells.size(); ++i) {
+      if (i > 0) text += ',';
+      text += csv_cell(cells[i]);
+    }
+    text += '\n';
+  };
+  add_line(columns_);
+  for (const auto& row : rows_) add_line(row);
   return text;
 }
 

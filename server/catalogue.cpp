@@ -113,7 +113,10 @@ std::vector<JobRecord> records_of(Statement& rows) {
 // Numbers of an enum, no text from outside.
 std::string in_list(const std::vector<v1::JobState>& states) {
   std::string list;
-  for (const auto state : states) list += (list.empty() ? "" : ",") + std::to_string(static_cast<int>(state));
+  for (const auto state : states) {
+    if (!list.empty()) list += ',';
+    list += std::to_string(static_cast<int>(state));
+  }
   return "state IN (" + list + ")";
 }
 
