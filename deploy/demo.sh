@@ -41,7 +41,9 @@ done < <(bedflow init mueller -o json | python3 -c '
 import json, sys
 for number, monitor in enumerate(json.load(sys.stdin)["monitors"]):
     if "averaging" in monitor: print(f"monitors[{number}].averaging")')
-bedflow init mueller --set "time.end=$end" --set output.interval=0.05 "${shorter[@]}" >"$data/case.txtpb"
+# The gas comes gently: at once it would lift the settled bed as one plug, and out of the box in the first half second.
+bedflow init mueller --set "time.end=$end" --set domain.faces.y_low.inflow.ramp.from=0.3 \
+  --set domain.faces.y_low.inflow.ramp.duration=0.25 "${shorter[@]}" >"$data/case.txtpb"
 echo "$data/case.txtpb"
 bedflow explain "$data/case.txtpb" --ranks 2
 
@@ -61,7 +63,7 @@ if ! kill -0 "$client" 2>/dev/null; then
 fi
 
 folder=$data/jobs/$job
-runner=$(sed -n 's/^pid: //p' "$(ls -t "$folder"/attempts/*/runner.txtpb | head -1)")
+runner=$(sed -n 's/^pid: //p' "$folder"/attempts/1/runner.txtpb)
 server=$(cat /proc/"$client"/task/*/children)
 mapfile -t engine < <(session_members "$runner")
 printf '\n'
@@ -72,13 +74,13 @@ wait "$client" 2>/dev/null || true
 trap - EXIT
 
 say "bedflow run --resume $data/$job"
-bedflow run --resume "$data/$job" </dev/null
+bedflow run --resume "$data/$job" </dev/null >/dev/null  # what it measured is shown below
 
 say "void fraction across the bed and bed height, with 95 % intervals"
 mapfile -t shown < <(python3 -c '
 import json, sys
 for monitor in json.load(sys.stdin)["monitors"]:
-    if "voidFraction" in monitor or "void_fraction" in monitor or "bedHeight" in monitor or "bed_height" in monitor: print(monitor["name"])' \
+    if "void_fraction" in monitor or "bed_height" in monitor: print(monitor["name"])' \
   < <(bedflow init mueller -o json))
 bedflow stats "$folder" "${shown[@]}"
 bedflow plot "$folder" "${shown[@]}" -o "$data/profiles.png"
@@ -86,5 +88,5 @@ bedflow render "$folder" -o "$data/bed.png"
 
 say "what there is now"
 echo "pictures:  $data/profiles.png  $data/bed.png"
-echo "ParaView:  $(ls "$folder"/plots/*.series | tr '\n' ' ')"
+echo "ParaView:  $(printf '%s ' "$folder"/plots/*.series)"
 echo "job:       $folder  (bedflow stats, plot, render and logs read it)"
