@@ -91,7 +91,7 @@ std::string Table::json_row(const std::vector<Cell>& row) const {
 
 std::string Table::csv() const {
   std::string text;
-  const auto add_line = [&](const std::vector<std::string>& cells) {
+  const auto add_line = [&](const auto& cells) {
     for (std::size_t i = 0; i < cells.size(); ++i) {
       if (i > 0) text += ',';
       text += csv_cell(cells[i]);

@@ -8,7 +8,8 @@ int main(int argc, char** argv) {
   testing::InitGoogleTest(&argc, argv);
   const bedflow::Comm world = bedflow::Comm::world();
   if (!world.root()) {  // the other ranks report failures only
-    delete testing::UnitTest::GetInstance()->listeners().Release(testing::UnitTest::GetInstance()->listeners().default_result_printer());
+    delete testing::UnitTest::GetInstance()->listeners().Release(
+        testing::UnitTest::GetInstance()->listeners().default_result_printer());
   }
   const int failed = RUN_ALL_TESTS();
   const bool any = world.any(failed != 0);

@@ -26,9 +26,10 @@ TEST(Drag, ErgunGivesTheErgunPressureDrop) {
       const double slip = superficial / fraction;
       const double number = (1 - fraction) / (M_PI / 6 * std::pow(scene.diameter, 3));  // particles per m³
       const double drop = number * Ergun{}(scene, slip, fraction) * slip / fraction;
-      const double ergun = 150 * std::pow(1 - fraction, 2) / std::pow(fraction, 3) * scene.viscosity * superficial /
-                               (scene.diameter * scene.diameter) +
-                           1.75 * (1 - fraction) / std::pow(fraction, 3) * scene.density * superficial * superficial / scene.diameter;
+      const double ergun =
+          150 * std::pow(1 - fraction, 2) / std::pow(fraction, 3) * scene.viscosity * superficial /
+              (scene.diameter * scene.diameter) +
+          1.75 * (1 - fraction) / std::pow(fraction, 3) * scene.density * superficial * superficial / scene.diameter;
       EXPECT_NEAR(drop / ergun, 1, 1e-13) << fraction << " " << superficial;
     }
   }
@@ -39,7 +40,8 @@ TEST(Drag, BlendIsHalfAndHalfAtFourFifthsAndTendsToItsParts) {
   EXPECT_DOUBLE_EQ(GidaspowBlended{}(scene, slip, 0.8), 0.5 * (WenYu{}(scene, slip, 0.8) + Ergun{}(scene, slip, 0.8)));
   // arctan(x)/π = ½ − 1/(πx): at |ε − 0.8| = 0.4 the other law has a share of 1/(π·262.5·0.4) = 0.30 %.
   const double share = 0.5 - std::atan(262.5 * 0.4) / M_PI;
-  EXPECT_NEAR(GidaspowBlended{}(scene, slip, 0.4), (1 - share) * Ergun{}(scene, slip, 0.4) + share * WenYu{}(scene, slip, 0.4), 1e-18);
+  EXPECT_NEAR(GidaspowBlended{}(scene, slip, 0.4), (1 - share) * Ergun{}(scene, slip, 0.4) + share * WenYu{}(scene, slip, 0.4),
+              1e-18);
 }
 
 TEST(Drag, EveryLawIsFiniteAndPositiveAtRest) {

@@ -50,7 +50,8 @@ TEST(Halo, FillBringsWhatTheOwnerHoldsEdgesAndCornersToo) {
     halo.fill(f);
     for (int k = -ghosts; k < grid.cells[2] + ghosts; ++k)
       for (int j = -ghosts; j < grid.cells[1] + ghosts; ++j)
-        for (int i = -ghosts; i < grid.cells[0] + ghosts; ++i) ASSERT_EQ(f(i, j, k), label(grid, i, j, k)) << i << " " << j << " " << k;
+        for (int i = -ghosts; i < grid.cells[0] + ghosts; ++i)
+          ASSERT_EQ(f(i, j, k), label(grid, i, j, k)) << i << " " << j << " " << k;
   }
 }
 
