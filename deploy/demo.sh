@@ -41,9 +41,7 @@ done < <(bedflow init mueller -o json | python3 -c '
 import json, sys
 for number, monitor in enumerate(json.load(sys.stdin)["monitors"]):
     if "averaging" in monitor: print(f"monitors[{number}].averaging")')
-# The gas comes gently: at once it would lift the settled bed as one plug, and out of the box in the first half second.
-bedflow init mueller --set "time.end=$end" --set domain.faces.y_low.inflow.ramp.from=0.3 \
-  --set domain.faces.y_low.inflow.ramp.duration=0.25 "${shorter[@]}" >"$data/case.txtpb"
+bedflow init mueller --set "time.end=$end" "${shorter[@]}" >"$data/case.txtpb"
 echo "$data/case.txtpb"
 bedflow explain "$data/case.txtpb" --ranks 2
 

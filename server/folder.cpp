@@ -45,6 +45,15 @@ std::vector<Number> numbers_in(const fs::path& folder, const std::function<std::
 
 }  // namespace
 
+DraftFolder::DraftFolder(std::filesystem::path path) : folder(std::move(path)) {
+  std::filesystem::create_directories(folder.checkpoints());
+  std::filesystem::create_directories(folder.attempts());
+}
+DraftFolder::~DraftFolder() {
+  std::error_code ignored;
+  std::filesystem::remove_all(folder.root(), ignored);
+}
+
 std::string JobFolder::checkpoint_name(std::uint64_t step) {
   char name[48];
   std::snprintf(name, sizeof name, "checkpoint_%010llu.h5", static_cast<unsigned long long>(step));

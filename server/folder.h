@@ -45,6 +45,17 @@ class JobFolder {
   std::filesystem::path root_;
 };
 
+// A job's folder that is being put together, gone with its owner unless it was renamed away.
+class DraftFolder {
+ public:
+  explicit DraftFolder(std::filesystem::path path);  // creates it; throws std::system_error
+  ~DraftFolder();
+  DraftFolder(const DraftFolder&) = delete;
+  DraftFolder& operator=(const DraftFolder&) = delete;
+
+  const JobFolder folder;
+};
+
 // Writes beside, fsyncs, renames, fsyncs the folder: the file is the old or the new one, whatever happens. Throws
 // std::system_error.
 void write_durably(const std::filesystem::path& path, std::string_view content);

@@ -43,23 +43,6 @@ std::string content_of(v1::CreateJobRequest request) {
   return bytes;
 }
 
-// A folder that is gone with its owner unless it is kept.
-class Draft {
- public:
-  explicit Draft(fs::path path) : folder(std::move(path)) {
-    fs::create_directories(folder.checkpoints());
-    fs::create_directories(folder.attempts());
-  }
-  ~Draft() {
-    std::error_code ignored;
-    fs::remove_all(folder.root(), ignored);
-  }
-  Draft(const Draft&) = delete;
-  Draft& operator=(const Draft&) = delete;
-
-  const JobFolder folder;
-};
-
 std::string steps_text(const std::vector<std::uint64_t>& steps) {
   std::string text;
   for (const auto step : steps) text += (text.empty() ? "" : ", ") + std::to_string(step);
@@ -183,7 +166,7 @@ v1::CreateJobResponse Jobs::create(const v1::CreateJobRequest& asked) {
                   "bedflow validate CASE", std::move(faults));
   }
   record.job.set_id(new_job_id());
-  const Draft draft(settings_.data / "drafts" / record.job.id());
+  const DraftFolder draft(settings_.data / "drafts" / record.job.id());
   write_durably(draft.folder.case_file(), case_text(request.case_()));
   v1::CreateJobResponse response;
   *response.mutable_plan() = plan_of(settings_.programs.engine, draft.folder.case_file(), request.spec().ranks());

@@ -217,7 +217,7 @@ Statistic statistic(const v1::Monitor& from) {
 }
 
 Side side(const v1::Face& face) {
-  return face.has_outflow() ? Side::open : Side::wall;
+  return face.has_outflow() && !face.outflow().screen() ? Side::open : Side::wall;
 }
 
 Scene make_scene(const v1::Case& from) {

@@ -218,7 +218,7 @@ bool Dem::judge(std::size_t row, double dt) {
     what << (side == Side::wall ? "passed the wall " : "left through the open face ") << "xyz"[face / 2]
          << (face % 2 == 0 ? "_low" : "_high")
          << (side == Side::wall ? " (a stiffer contact or more particles.steps_per_collision would hold it)"
-                                : " (a larger domain.size would keep it)");
+                                : " (a larger domain.size would keep it, or outflow { screen: true } on that face)");
     return say(Reason::particle_lost, what.str());
   }
   const Vec3 moved = x - place_[row];

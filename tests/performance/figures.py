@@ -47,12 +47,13 @@ def sweep(bin_folder, group):
         yield f"{group}/{entry['run_name']}", value, unit
 
 
-def bed(bin_folder, name="mueller", seconds=0.05):
-    """Figures of a whole bed, settled and then run for a short simulated time on one rank."""
+def bed(bin_folder, name="mueller", fluidized=0.25, measured=0.05):
+    """Figures of a whole bed on one rank: run until it is fluidized, then resumed and measured (simulated s)."""
     with tempfile.TemporaryDirectory(prefix="bedflow-bench-") as folder:
-        case = run([bin_folder / "bedflow", "init", name, "--set", f"time.end={seconds}"])
-        (pathlib.Path(folder) / "case.txtpb").write_text(case)
-        run([bin_folder / "bedflow-engine", folder])
+        for end in (fluidized, fluidized + measured):
+            case = run([bin_folder / "bedflow", "init", name, "--set", f"time.end={end}"])
+            (pathlib.Path(folder) / "case.txtpb").write_text(case)
+            run([bin_folder / "bedflow-engine", folder])
         summary = json.loads((pathlib.Path(folder) / "summary.json").read_text())
     yield f"bed/{name}/particle_substep", summary["particle_substep_microseconds"], "us per particle and sub-step, all told"
     yield f"bed/{name}/gas_share", 100 * summary["gas_share"], "% of the time"
