@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <fstream>
 
+#include "bedflow/v1/results.pb.h"
 #include "case_source.h"
 #include "cases/ready_cases.h"
 #include "child.h"

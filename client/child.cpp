@@ -99,7 +99,7 @@ void exchange(Pipe& in, Pipe& out, Pipe& error, const std::string& input, ChildR
 }  // namespace
 
 std::filesystem::path beside_own_executable(const std::string& name) {
-  const auto path = std::filesystem::read_symlink("/proc/self/exe").parent_path() / name;
+  auto path = std::filesystem::read_symlink("/proc/self/exe").parent_path() / name;
   if (!std::filesystem::exists(path)) {
     throw Failure(Exit::other, "the program " + name + " is not beside bedflow, in " + path.parent_path().string(),
                   "install or build " + name + " into that folder");

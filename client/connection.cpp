@@ -12,7 +12,7 @@ namespace bedflow::client {
 
 namespace {
 
-constexpr int kLargestMessage = 512 << 20;  // a snapshot of 20 million particles
+constexpr int largest_message = 512 << 20;  // a snapshot of 20 million particles
 
 // Tells a person that something is under way when an answer takes longer than what feels immediate.
 class WaitingNote {
@@ -74,7 +74,7 @@ std::string default_address() {
 
 Connection::Connection(std::string address) : address_(std::move(address)) {
   grpc::ChannelArguments arguments;
-  arguments.SetMaxReceiveMessageSize(kLargestMessage);
+  arguments.SetMaxReceiveMessageSize(largest_message);
   arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);  // an engine's server is near: no proxy stands between
   arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 100);
   arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, 100);

@@ -18,8 +18,8 @@ namespace bedflow::client {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-constexpr std::chrono::seconds kStartLimit{30}, kStopLimit{10};
-constexpr int kMostStarts = 5;
+constexpr std::chrono::seconds start_limit{30}, stop_limit{10};
+constexpr int most_starts = 5;
 
 std::string last_of(const std::filesystem::path& log) {
   std::ifstream file(log);
@@ -58,7 +58,7 @@ EmbeddedServer::~EmbeddedServer() {
   } catch (const Failure&) {  // it does not answer: nothing is lost by ending it, jobs outlive their server
   }
   kill(child_, SIGTERM);
-  const auto limit = Clock::now() + kStopLimit;
+  const auto limit = Clock::now() + stop_limit;
   while (!child_ended() && Clock::now() < limit) std::this_thread::sleep_for(std::chrono::milliseconds(20));
 }
 
@@ -77,8 +77,8 @@ bool EmbeddedServer::child_ended() {
 }
 
 void EmbeddedServer::start() {
-  if (starts_++ == kMostStarts) {
-    throw Failure(Exit::unreachable, "the embedded server died " + std::to_string(kMostStarts) + " times: " + last_of(log_),
+  if (starts_++ == most_starts) {
+    throw Failure(Exit::unreachable, "the embedded server died " + std::to_string(most_starts) + " times: " + last_of(log_),
                   "its log is " + log_.string());
   }
   const auto program = beside_own_executable("bedflowd");
@@ -87,7 +87,7 @@ void EmbeddedServer::start() {
 }
 
 void EmbeddedServer::wait_until_ready() {
-  const auto limit = Clock::now() + kStartLimit;
+  const auto limit = Clock::now() + start_limit;
   while (!answers(1)) {
     if (child_ended())
       throw Failure(Exit::unreachable, "the embedded server did not start: " + last_of(log_), "its log is " + log_.string());

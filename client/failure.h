@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "bedflow/v1/job.pb.h"
+#include "bedflow/v1/service.pb.h"
 #include "case_file.h"
 
 namespace bedflow::client {

@@ -19,7 +19,7 @@ void add_format(CLI::App* verb, Format& format) {
 
 namespace {
 
-constexpr const char* kFooter =
+constexpr const char* footer =
     "A first bed:   bedflow run mueller --ranks 2 --end 0.5\n"
     "An own case:   bedflow init mueller > case.txtpb, edit, bedflow validate case.txtpb, bedflow run case.txtpb\n"
     "Exit codes:    0 ok, 1 other, 2 usage or invalid case, 3 job failed, 4 not allowed, 5 not found, 6 wrong state,\n"
@@ -29,7 +29,7 @@ int run(int argc, char** argv) {
   CLI::App app("bedflow: CFD-DEM of particle beds as a service", "bedflow");
   Program program;
   app.set_version_flag("--version", "bedflow " BEDFLOW_VERSION);
-  app.footer(kFooter);
+  app.footer(footer);
   app.require_subcommand(1);
   app.fallthrough();
   app.get_formatter()->column_width(34);

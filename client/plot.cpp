@@ -12,10 +12,10 @@ namespace bedflow::client {
 
 namespace {
 
-constexpr int kPanelWidth = 800, kPanelHeight = 480, kTitleHeight = 56;
-constexpr const char* kOurs = "#1f5fa8";
-constexpr const char* kBand = "#c9dcf2";
-constexpr const char* kMeasured = "#c0392b";
+constexpr int panel_width = 800, panel_height = 480, title_height = 56;
+constexpr const char* ours = "#1f5fa8";
+constexpr const char* band = "#c9dcf2";
+constexpr const char* measured = "#c0392b";
 
 std::string number(double value) {
   return std::isfinite(value) ? number_text(value) : "NaN";
@@ -74,7 +74,7 @@ class Panel {
   }
   // Starts a block of data; returns its name.
   std::string block(const std::string& rows) {
-    const std::string name = block_ + "_" + std::to_string(blocks_++);
+    std::string name = block_ + "_" + std::to_string(blocks_++);
     head_ = name + " << EOD\n" + rows + "EOD\n" + head_;
     return name;
   }
@@ -115,11 +115,11 @@ void draw_references(Panel& panel, const std::vector<const v1::Reference*>& refe
       const auto line =
           panel.block(row({from, value, value - half, value + half}) + row({to, value, value - half, value + half}));
       if (point.has_half_width())
-        panel.draw(line + " using 1:3:4 with filledcurves fc rgb \"" + kMeasured + "\" fs transparent solid 0.12 notitle");
-      panel.draw(line + " using 1:2 with lines dt 2 lw 1.6 lc rgb \"" + kMeasured + "\"" + title);
+        panel.draw(line + " using 1:3:4 with filledcurves fc rgb \"" + measured + "\" fs transparent solid 0.12 notitle");
+      panel.draw(line + " using 1:2 with lines dt 2 lw 1.6 lc rgb \"" + measured + "\"" + title);
     }
     if (points.empty()) continue;
-    const std::string style = " pt " + std::to_string(symbol) + " ps 1.1 lw 1.2 lc rgb \"" + kMeasured + "\"" + title;
+    const std::string style = " pt " + std::to_string(symbol) + " ps 1.1 lw 1.2 lc rgb \"" + measured + "\"" + title;
     panel.draw(panel.block(points) + (intervals ? " using 1:2:3 with yerrorbars" : " using 1:2 with points") + style);
     symbol = symbol == 6 ? 8 : symbol == 8 ? 4 : 12;
   }
@@ -142,8 +142,8 @@ std::string series_panel(const v1::Series& series, const std::optional<v1::Case>
   const bool interval = averaged && series.average().has_half_width();
   const auto bins =
       averaged ? panel.block(row({from, mean, mean - half, mean + half}) + row({to, mean, mean - half, mean + half})) : "";
-  if (interval) panel.draw(bins + " using 1:3:4 with filledcurves fc rgb \"" + kBand + "\" title \"95 % interval of the mean\"");
-  panel.draw(panel.block(rows.empty() ? row({NAN, NAN}) : rows) + " using 1:2 with lines lw 1.3 lc rgb \"" + kOurs +
+  if (interval) panel.draw(bins + " using 1:3:4 with filledcurves fc rgb \"" + band + "\" title \"95 % interval of the mean\"");
+  panel.draw(panel.block(rows.empty() ? row({NAN, NAN}) : rows) + " using 1:2 with lines lw 1.3 lc rgb \"" + ours +
              "\" title \"bedflow\"");
   if (averaged) {
     const std::string title =
@@ -172,9 +172,9 @@ std::string profile_panel(const v1::Profile& profile, const std::optional<v1::Ca
     rows += row({profile.place(i) * x.factor, mean * y.factor, estimate.half_width() * y.factor});
   }
   const auto data = panel.block(rows.empty() ? row({NAN, NAN, NAN}) : rows);
-  panel.draw(data + " using 1:2 with lines lw 1 lc rgb \"" + kOurs + "\" notitle");
+  panel.draw(data + " using 1:2 with lines lw 1 lc rgb \"" + ours + "\" notitle");
   panel.draw(data + (intervals ? " using 1:2:3 with yerrorbars" : " using 1:2 with points") + " pt 7 ps 0.9 lw 1.3 lc rgb \"" +
-             kOurs + "\" title \"" + (intervals ? "bedflow, 95 % interval" : "bedflow") + "\"");
+             ours + "\" title \"" + (intervals ? "bedflow, 95 % interval" : "bedflow") + "\"");
   draw_references(panel, references_of(value, profile.name()), x.factor, y.factor, 0, 0);
   return panel.script();
 }
@@ -186,7 +186,7 @@ std::string plot_script(const v1::Statistics& statistics, const std::optional<v1
   const int panels = statistics.series_size() + statistics.profiles_size();
   const int columns = panels > 2 ? 2 : 1;
   const int rows = (panels + columns - 1) / columns;
-  std::string text = picture_head(file, {columns * kPanelWidth, rows * kPanelHeight + kTitleHeight});
+  std::string text = picture_head(file, {columns * panel_width, rows * panel_height + title_height});
   std::string title = (value ? value->name() + "    " : "") + job;
   title += "    step " + std::to_string(statistics.step()) + ", t = " + number(statistics.time()) + " s";
   text += "set multiplot layout " + std::to_string(rows) + "," + std::to_string(columns) + " title " + gnuplot_quoted(title) +

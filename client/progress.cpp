@@ -9,9 +9,9 @@ namespace bedflow::client {
 
 namespace {
 
-constexpr double kSpeedWindow = 15;  // wall s
-constexpr std::chrono::milliseconds kRedraw{100};
-constexpr std::chrono::seconds kLineInterval{10};
+constexpr double speed_window = 15;  // wall s
+constexpr std::chrono::milliseconds redraw_interval{100};
+constexpr std::chrono::seconds line_interval{10};
 
 double share_done(const v1::Progress& progress) {
   return progress.end_time() > 0 ? std::clamp(progress.time() / progress.end_time(), 0.0, 1.0) : 0;
@@ -51,7 +51,7 @@ void SpeedGauge::add(const v1::Progress& progress) {
     points_.clear();  // a new attempt
   if (!points_.empty() && point.wall == points_.back().wall) points_.pop_back();
   points_.push_back(point);
-  while (points_.size() > 2 && points_.back().wall - points_[1].wall > kSpeedWindow) points_.pop_front();
+  while (points_.size() > 2 && points_.back().wall - points_[1].wall > speed_window) points_.pop_front();
 }
 
 std::optional<double> SpeedGauge::simulated_per_wall() const {
@@ -90,7 +90,8 @@ void ProgressDisplay::update(const v1::Progress& progress) {
   speed_.add(progress);
   newest_ = progress;
   newest_shown_ = false;
-  const auto wait = terminal_.interactive() ? std::chrono::milliseconds(kRedraw) : std::chrono::milliseconds(kLineInterval);
+  const auto wait =
+      terminal_.interactive() ? std::chrono::milliseconds(redraw_interval) : std::chrono::milliseconds(line_interval);
   if (!shown_ || Clock::now() - *shown_ >= wait) draw();
 }
 

@@ -14,9 +14,9 @@ namespace bedflow::client {
 namespace {
 
 // Perceptually even, readable in grey and by the colour-blind.
-constexpr const char* kSpeedPalette =
+constexpr const char* speed_palette =
     "(0 '#352a87', 0.15 '#0f5cdd', 0.3 '#1481d6', 0.45 '#06a4ca', 0.6 '#2eb7a4', 0.75 '#87bf77', 0.88 '#d1bb59', 1 '#f9fb0e')";
-constexpr const char* kGasPalette = "(0 '#08306b', 0.25 '#2171b5', 0.5 '#6baed6', 0.75 '#c6dbef', 1 '#ffffff')";
+constexpr const char* gas_palette = "(0 '#08306b', 0.25 '#2171b5', 0.5 '#6baed6', 0.75 '#c6dbef', 1 '#ffffff')";
 
 // Pixels of the page. Both maps have the same size and scale.
 struct Page {
@@ -134,12 +134,12 @@ std::string render_script(const v1::Snapshot& snapshot, const std::string& job, 
   text += "set xlabel \"width  /  mm\"\nset xtics autofreq\nset cbtics out scale 0.4\n";
   if (particles) {
     text += "$particles << EOD\n" + drawing.particles() + "EOD\n";
-    text += drawing.next_map("particles", "speed  /  m/s", kSpeedPalette, true);
+    text += drawing.next_map("particles", "speed  /  m/s", speed_palette, true);
     text += "set cbrange [0:" + number_text(drawing.highest_speed()) + "]\n" + drawing.circles();
   }
   if (gas) {
     text += "$gas << EOD\n" + drawing.gas() + "EOD\n";
-    text += drawing.next_map("gas, mean over the depth", "gas fraction ε", kGasPalette, !particles);
+    text += drawing.next_map("gas, mean over the depth", "gas fraction ε", gas_palette, !particles);
     text += "set cbrange [0.35:1]\nset cbtics 0.1\nplot $gas using 1:2:3 with image notitle\n";
   }
   return text + "unset multiplot\nunset output\n";

@@ -64,7 +64,7 @@ class Watch {
     v1::WatchJobResponse response;
     while (!end_ && reader->Read(&response)) take(response);
     if (end_) context.TryCancel();
-    const auto status = reader->Finish();
+    auto status = reader->Finish();
     done = true;
     guard.join();
     return status;

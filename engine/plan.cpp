@@ -10,9 +10,11 @@ namespace bedflow {
 
 namespace {
 
-// Measured by deploy/bench.sh on one core; they make the estimate of the wall time and nothing else.
-constexpr double particle_substep_seconds = 0.09e-6;  // without history; a history adds a third
-constexpr double cell_step_seconds = 1.5e-6;          // two outer iterations of SIMPLE
+// Measured on the Müller bed, fluidized, one core (deploy/bench.sh bed prints them anew); they make the estimate of the wall time
+// and nothing else. A resting bed costs up to twice as much a sub-step, a dilute one half.
+constexpr double particle_substep_seconds = 0.05e-6;  // without history; a history adds a third
+constexpr double particle_step_seconds = 0.3e-6;      // to the grid and back
+constexpr double cell_step_seconds = 0.4e-6;          // two outer iterations of SIMPLE
 
 std::string number(double value) {
   char text[32];
@@ -108,9 +110,15 @@ void plan_cost(Plan& plan) {
                       particles * (24.0 * (rotation ? 8 : 5) + 16 + 8 * (4 + (history ? 25 : 0)));
   plan.checkpoint_bytes = 100e3 + field * 5 + particles * (8 + 24.0 * (rotation ? 4 : 3) + (history ? 3 * 40 : 0));
   const auto steps = static_cast<double>(plan.steps);
-  plan.seconds = steps *
-                 (cells * cell_step_seconds + particles * plan.substeps * particle_substep_seconds * (history ? 1.33 : 1)) /
-                 plan.ranks;
+  const double substep = particles * particle_substep_seconds * (history ? 1.33 : 1);
+  plan.seconds =
+      steps * (cells * cell_step_seconds + (scene.coupling ? particles * particle_step_seconds : 0) + plan.substeps * substep);
+  if (const auto* random = scene.particles ? std::get_if<RandomPlaces>(&scene.particles->places) : nullptr;
+      random && random->settling) {
+    const double fall = 1.2 * std::sqrt(2 * random->seeds.high.y / norm(scene.gravity));  // it is at rest soon after
+    plan.seconds += std::min(fall, random->settling->duration) / plan.substep * substep;
+  }
+  plan.seconds /= plan.ranks;
 }
 
 void plan_parts(Plan& plan) {

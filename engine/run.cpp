@@ -244,7 +244,7 @@ class Run {
                       .step_size = simulation_->step_size(),
                       .end_time = plan_.scene.end_time,
                       .wall_seconds = wall_seconds(),
-                      .eta_seconds = done > 0 ? std::max(0.0, left / speed) : 0,
+                      .eta_seconds = done > 0 ? std::max(0.0, left / speed) : -1,
                       .substeps = simulation_->substeps(),
                       .particles = static_cast<std::uint64_t>(simulation_->particle_count()),
                       .gas_iterations = simulation_->gas_outcome().iterations,

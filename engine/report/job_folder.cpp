@@ -133,7 +133,7 @@ void JobFolder::progress(const ProgressReport& now) {
     progress.set_step_size(now.step_size);
     progress.set_end_time(now.end_time);
     progress.set_wall_seconds(now.wall_seconds);
-    progress.set_eta_seconds(now.eta_seconds);
+    if (now.eta_seconds >= 0) progress.set_eta_seconds(now.eta_seconds);
     progress.set_substeps(now.substeps);
     progress.set_particles(now.particles);
     progress.set_gas_iterations(static_cast<std::uint32_t>(now.gas_iterations));

@@ -31,7 +31,7 @@ enum class Command { none, checkpoint, suspend, cancel, cancel_now };  // cancel
 struct ProgressReport {
   std::uint64_t step = 0;
   double time = 0, step_size = 0, end_time = 0;  // s
-  double wall_seconds = 0, eta_seconds = 0;
+  double wall_seconds = 0, eta_seconds = -1;     // s; below 0: not known yet
   std::uint64_t substeps = 0, particles = 0;
   int gas_iterations = 0;
   const char* phase = "running";

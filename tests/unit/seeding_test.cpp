@@ -95,6 +95,7 @@ TEST(Seeding, ALatticeFillsItsRegionHalfASpacingFromTheFaces) {
 TEST(Seeding, PlacedSpheresGoToTheirOwnersAsGiven) {
   const Comm world = Comm::world();
   std::vector<PlacedSphere> spheres;
+  spheres.reserve(9);
   for (int i = 0; i < 9; ++i)
     spheres.push_back({{0.002 + 0.002 * i, 0.003 + 0.003 * i, 0.005}, {0.1 * i, 0, 0}, {0, 0, 1.0 * i}});
   const Decomposition d = decomposition(world);

@@ -148,7 +148,9 @@ TEST(Failure, ALostParticleIsNamedAndAllRanksStopTogether) {
   Spheres spheres;
   Scene<Coulomb> scene(Comm::world(), {0.02, 0.02, 0.02}, spheres);
   std::vector<PlacedSphere> placed(20);
-  for (int i = 0; i < 20; ++i) placed[i].position = {0.002 + 0.004 * (i % 5), 0.002 + 0.004 * (i / 5), 0.01};
+  for (int row = 0; row < 4; ++row)
+    for (int column = 0; column < 5; ++column)
+      placed[5 * row + column].position = {0.002 + 0.004 * column, 0.002 + 0.004 * row, 0.01};
   placed[2].velocity = {0, -60, 0};  // the centre reaches the wall from r √(k/m) = 13 m/s on
   scene.place(placed);
   scene.advance(1000, 1e-7);
