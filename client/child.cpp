@@ -61,6 +61,7 @@ pid_t spawn(const std::vector<std::string>& command, posix_spawn_file_actions_t*
   const int flags = POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | (own_session ? POSIX_SPAWN_SETSID : 0);
   posix_spawnattr_setflags(&attributes, static_cast<short>(flags));
   std::vector<char*> arguments;
+  arguments.reserve(command.size() + 1);
   for (const auto& word : command) arguments.push_back(const_cast<char*>(word.c_str()));
   arguments.push_back(nullptr);
   pid_t pid = -1;

@@ -9,6 +9,7 @@ namespace bedflow::client {
 template <class Messages>
 std::vector<const google::protobuf::Message*> pointers(const Messages& messages) {
   std::vector<const google::protobuf::Message*> all;
+  all.reserve(static_cast<std::size_t>(messages.size()));
   for (const auto& message : messages) all.push_back(&message);
   return all;
 }

@@ -175,7 +175,7 @@ void add_job_verbs(CLI::App& app, Program& program) {
   on_call(verb, program, list_options, list);
 
   const auto one_job = [&](const char* name, const char* meaning, Exit (*function)(const Program&, const OneJobOptions&)) {
-    const auto options = std::make_shared<OneJobOptions>();
+    auto options = std::make_shared<OneJobOptions>();
     verb = app.add_subcommand(name, meaning);
     verb->add_option("job", options->job, "id of the job")->required();
     add_format(verb, options->format);

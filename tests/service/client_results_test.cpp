@@ -17,7 +17,7 @@ namespace {
 using testing::HasSubstr;
 using testing::StartsWith;
 
-constexpr const char* kId = "j-000000000001";
+constexpr const char* job_id = "j-000000000001";
 
 v1::Estimate estimate_of(double mean, double half_width, std::uint32_t bins = 6) {
   v1::Estimate estimate;
@@ -95,7 +95,7 @@ class ClientResults : public Client {
   ClientResults() {
     service_.statistics = bed_statistics();
     service_.snapshot = bed_snapshot();
-    service_.jobs[kId] = job_of(kId, v1::SUCCEEDED);
+    service_.jobs[job_id] = job_of(job_id, v1::SUCCEEDED);
     service_.job_case = ready_case("mueller");
   }
   // A folder as the engine leaves it, with two bins of a series.
@@ -131,16 +131,16 @@ class ClientResults : public Client {
 };
 
 TEST_F(ClientResults, StatsComeAsTableJsonAndCsv) {
-  const auto table = bedflow({"stats", kId});
+  const auto table = bedflow({"stats", job_id});
   EXPECT_EQ(table.exit_code, 0) << table.error;
   EXPECT_THAT(table.out, HasSubstr("0.02030 ± 0.00040"));
   EXPECT_THAT(table.out, HasSubstr("void_fraction"));
-  const auto csv = bedflow({"stats", kId, "-o", "csv"}).out;
+  const auto csv = bedflow({"stats", job_id, "-o", "csv"}).out;
   EXPECT_THAT(
       csv, StartsWith("name,unit,place_m,samples,last,mean,half_width,bins,deviation,deviation_half_width\nbed_height,m,,2000,"));
   EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 1 + 1 + 18);  // header, series, places
-  EXPECT_THAT(bedflow({"stats", kId, "-o", "json"}).out, HasSubstr("\"name\": \"bed_height\""));
-  const auto samples = bedflow({"stats", kId, "--samples", "-o", "csv"}).out;
+  EXPECT_THAT(bedflow({"stats", job_id, "-o", "json"}).out, HasSubstr("\"name\": \"bed_height\""));
+  const auto samples = bedflow({"stats", job_id, "--samples", "-o", "csv"}).out;
   EXPECT_EQ(std::count(samples.begin(), samples.end(), '\n'), 1 + 2000);
 }
 
@@ -157,7 +157,7 @@ TEST_F(ClientResults, StatsOfAFolderNeedNoServer) {
 
 TEST_F(ClientResults, PlotDrawsAPngWithThePanelsOfItsMonitors) {
   const auto file = folder_ / "plot.png";
-  const auto result = bedflow({"plot", kId, "-o", file.string()});
+  const auto result = bedflow({"plot", job_id, "-o", file.string()});
   ASSERT_EQ(result.exit_code, 0) << result.error;
   const auto bytes = read(file);
   EXPECT_EQ(png_size(bytes).width, 800);
@@ -167,7 +167,7 @@ TEST_F(ClientResults, PlotDrawsAPngWithThePanelsOfItsMonitors) {
 
 TEST_F(ClientResults, RenderDrawsTheBedToOneScale) {
   const auto file = folder_ / "bed.png";
-  const auto result = bedflow({"render", kId, "-o", file.string()});
+  const auto result = bedflow({"render", job_id, "-o", file.string()});
   ASSERT_EQ(result.exit_code, 0) << result.error;
   const auto bytes = read(file);
   EXPECT_GT(png_size(bytes).height, 1000);
@@ -177,7 +177,7 @@ TEST_F(ClientResults, RenderDrawsTheBedToOneScale) {
 TEST_F(ClientResults, PicturesWithoutGnuplotNameThePackage) {
   const std::string path = getenv("PATH");
   setenv("PATH", folder_.c_str(), 1);
-  const auto result = bedflow({"render", kId, "-o", (folder_ / "x.png").string()});
+  const auto result = bedflow({"render", job_id, "-o", (folder_ / "x.png").string()});
   setenv("PATH", path.c_str(), 1);
   EXPECT_EQ(result.exit_code, static_cast<int>(Exit::other));
   EXPECT_THAT(result.error, HasSubstr("apt-get install gnuplot-nox"));

@@ -15,11 +15,11 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-constexpr const char* kId = "j-000000000001";
+constexpr const char* job_id = "j-000000000001";
 
 v1::WatchJobResponse state_message(v1::JobState state, std::uint64_t last, v1::StopReason reason = v1::FINISHED) {
   v1::WatchJobResponse message;
-  *message.mutable_job() = job_of(kId, state, reason);
+  *message.mutable_job() = job_of(job_id, state, reason);
   message.mutable_job()->set_last_sequence(last);
   return message;
 }
@@ -37,7 +37,7 @@ TEST_F(Client, WatchGoesOnFromItsTokenAfterADroppedStream) {
   service_.watches = {{{state_message(v1::RUNNING, 2), event_message(1), event_message(2)}, {grpc::UNAVAILABLE, "going down"}},
                       {{state_message(v1::RUNNING, 3), event_message(2), event_message(3)}, {grpc::UNAVAILABLE, "again"}},
                       {{state_message(v1::RUNNING, 3), event_message(4), state_message(v1::SUCCEEDED, 4)}, grpc::Status::OK}};
-  const auto result = bedflow({"watch", kId, "--history", "-o", "jsonl"});
+  const auto result = bedflow({"watch", job_id, "--history", "-o", "jsonl"});
   EXPECT_EQ(result.exit_code, 0) << result.error;
   EXPECT_THAT(service_.tokens(), ElementsAre(0, 2, 3));
   for (const char* sequence : {"1", "2", "3", "4"}) {  // each event once, though one was sent twice
@@ -56,7 +56,7 @@ TEST_F(Client, WatchGivesUpAServerThatStaysAwayInBoundedTime) {
     EXPECT_TRUE(service_.wait_for_watchers(1, std::chrono::seconds(20)));
     stop_server();
   });
-  const auto result = bedflow({"watch", kId, "--history", "--away", "0.5"});
+  const auto result = bedflow({"watch", job_id, "--history", "--away", "0.5"});
   away.join();
   EXPECT_EQ(result.exit_code, static_cast<int>(Exit::unreachable));
   EXPECT_THAT(result.error, HasSubstr("bedflow watch j-000000000001 --after 7"));
@@ -71,15 +71,15 @@ TEST_F(Client, TheEndOfTheJobIsTheExitCode) {
       {v1::STATE_SUSPENDED, v1::SUSPENDED, Exit::wrong_state}};
   for (const auto& [state, reason, exit] : expected) {
     service_.watches = {ended(state, reason)};
-    EXPECT_EQ(bedflow({"watch", kId}).exit_code, static_cast<int>(exit));
-    EXPECT_EQ(bedflow({"wait", kId}).exit_code, static_cast<int>(exit));
+    EXPECT_EQ(bedflow({"watch", job_id}).exit_code, static_cast<int>(exit));
+    EXPECT_EQ(bedflow({"wait", job_id}).exit_code, static_cast<int>(exit));
   }
-  EXPECT_EQ(bedflow({"wait", kId, "--for", "suspended"}).exit_code, static_cast<int>(Exit::ok));
+  EXPECT_EQ(bedflow({"wait", job_id, "--for", "suspended"}).exit_code, static_cast<int>(Exit::ok));
 }
 
 TEST_F(Client, WaitThatIsTooLongIsExitEight) {
   service_.watches = {{{state_message(v1::RUNNING, 0)}, grpc::Status::OK, true}};
-  const auto result = bedflow({"wait", kId, "--timeout", "0.2"});
+  const auto result = bedflow({"wait", job_id, "--timeout", "0.2"});
   EXPECT_EQ(result.exit_code, static_cast<int>(Exit::timed_out));
   EXPECT_THAT(result.error, HasSubstr("still RUNNING after 0.2 s"));
 }
@@ -87,7 +87,7 @@ TEST_F(Client, WaitThatIsTooLongIsExitEight) {
 TEST_F(Client, InterruptDetachesAndNeverCancels) {
   service_.watches = {{{state_message(v1::RUNNING, 0)}, grpc::Status::OK, true}};
   const auto log = folder_ / "log";
-  const pid_t pid = start_detached({program(), "watch", kId, "--server", address_}, log);
+  const pid_t pid = start_detached({program(), "watch", job_id, "--server", address_}, log);
   ASSERT_TRUE(service_.wait_for_watchers(1, std::chrono::seconds(20)));
   kill(pid, SIGINT);
   int status = 0;
@@ -103,7 +103,7 @@ TEST_F(Client, LogsEndsWithTheNewestEventOfARunningJob) {
   warning.mutable_event()->mutable_log()->set_severity(v1::LogLine::WARNING);
   warning.mutable_event()->mutable_log()->set_text("a step was cut");
   service_.watches = {{{state_message(v1::RUNNING, 2), event_message(1), warning}, grpc::Status::OK, true}};
-  const auto result = bedflow({"logs", kId});
+  const auto result = bedflow({"logs", job_id});
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_THAT(result.out, HasSubstr("warning: a step was cut"));
 }
