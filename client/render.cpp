@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <numeric>
+#include <utility>
 #include <vector>
 
 #include "failure.h"
@@ -101,11 +102,11 @@ class Drawing {
   }
 
   // With a thin rim that tells neighbours of one colour apart, as long as a circle has pixels enough for it.
-  std::string circles() const {
+  std::string circles(double speed_scale) const {
     const double pixels = snapshot_.diameter() * page_.scale;
     const std::string rim = pixels >= 5 ? "border lc rgb \"#303030\"" : "noborder";
-    return "plot $particles using 1:2:(" + number_text(500 * snapshot_.diameter()) +
-           "):3 with circles fillcolor palette lw 0.35 fillstyle solid 1.0 " + rim + " notitle\n";
+    return "plot $particles using 1:2:(" + number_text(500 * snapshot_.diameter()) + "):($3*" + number_text(speed_scale) +
+           ") with circles fillcolor palette lw 0.35 fillstyle solid 1.0 " + rim + " notitle\n";
   }
 
  private:
@@ -114,6 +115,13 @@ class Drawing {
   int width_, height_;
   int shown_ = 0;
 };
+
+// The unit in which the highest speed (m/s) is a number short enough for the colour bar, and how many of it a m/s is.
+std::pair<const char*, double> speed_unit(double highest) {
+  if (highest >= 0.1) return {"m/s", 1};
+  if (highest >= 1e-4) return {"mm/s", 1e3};
+  return {"µm/s", 1e6};
+}
 
 }  // namespace
 
@@ -134,8 +142,10 @@ std::string render_script(const v1::Snapshot& snapshot, const std::string& job, 
   text += "set xlabel \"width  /  mm\"\nset xtics autofreq\nset cbtics out scale 0.4\n";
   if (particles) {
     text += "$particles << EOD\n" + drawing.particles() + "EOD\n";
-    text += drawing.next_map("particles", "speed  /  m/s", speed_palette, true);
-    text += "set cbrange [0:" + number_text(drawing.highest_speed()) + "]\n" + drawing.circles();
+    const double highest = drawing.highest_speed();
+    const auto [label, scale] = speed_unit(highest);
+    text += drawing.next_map("particles", std::string("speed  /  ") + label, speed_palette, true);
+    text += "set cbrange [0:" + number_text(scale * highest) + "]\n" + drawing.circles(scale);
   }
   if (gas) {
     text += "$gas << EOD\n" + drawing.gas() + "EOD\n";

@@ -1,5 +1,7 @@
 #include "plan.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -121,6 +123,14 @@ void plan_cost(Plan& plan) {
   plan.seconds /= plan.ranks;
 }
 
+void check_memory(Plan& plan) {
+  const double here = static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGE_SIZE));
+  if (plan.memory_bytes > here) {
+    plan.warnings.push_back("the scene needs about " + number(plan.memory_bytes / 1e9) + " GB, this machine has " +
+                            number(here / 1e9) + " GB: fewer cells (domain.cells) or particles, or a machine with more");
+  }
+}
+
 void plan_parts(Plan& plan) {
   const Scene& scene = plan.scene;
   const auto add = [&](const char* part, bool on, const std::string& why) { plan.items.push_back({part, on, why}); };
@@ -183,6 +193,7 @@ Plan make_plan(const Scene& scene, int ranks) {
   plan_time(plan);
   check_coupling(plan);
   plan_cost(plan);
+  check_memory(plan);
   plan_parts(plan);
   for (const MonitorSetup& monitor : scene.monitors) {
     const double needed = monitor.averaging_start + monitor.averaging_bin * monitor.averaging_bins;

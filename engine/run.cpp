@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <cstring>
 #include <fstream>
+#include <new>
 #include <sstream>
 #include <system_error>
 
@@ -48,6 +49,12 @@ class Run {
       outcome = advance_to_end();
     } catch (const Stop& stop) {
       outcome = stop;
+    } catch (const std::bad_alloc&) {  // the other ranks may wait for this one: say it, and end them all
+      const std::string text = "rank " + std::to_string(comm_.rank()) + " of " + std::to_string(comm_.size()) +
+                               " is out of memory; `bedflow explain` says what the scene needs";
+      std::fprintf(stderr, "bedflow-engine: %s\n", text.c_str());
+      folder_.stopped(Reason::out_of_memory, text, simulation_ ? simulation_->steps() : 0, simulation_ ? simulation_->time() : 0);
+      comm_.abort(static_cast<int>(Reason::out_of_memory));
     }
     finish(outcome);
     return outcome.reason;

@@ -49,6 +49,7 @@ Transfer::Transfer(const Decomposition& decomposition, const Grid& grid, Halo& h
       gradient_(grid),
       buoyancy_share_(grid, 1) {
   for (int d = 0; d < 3; ++d) {
+    shares_[d].resize(grid.size());
     const bool low = decomposition.at_face(d, 0), high = decomposition.at_face(d, 1);
     lowest_cell_[d] = low ? 0 : -grid.ghosts;
     highest_cell_[d] = high ? grid.cells[d] - 1 : grid.cells[d] + grid.ghosts - 1;
@@ -135,11 +136,7 @@ template <class Drag>
 void Transfer::deposit_drag(const Drag& drag, const DragScene& scene, const ParticleStore& particles, const GasState& gas,
                             Exchange& exchange) {
   const PhaseTimer::Scope scope(timer_, Phase::deposit, particles.owned);
-  for (int d = 0; d < 3; ++d) {
-    exchange.drag[d].fill(0);
-    exchange.drag_momentum[d].fill(0);
-    exchange.buoyancy[d].fill(0);
-  }
+  for (auto& shares : shares_) std::fill(shares.begin(), shares.end(), Share{});
   drag_.resize(particles.owned);
   const double share = particle_volume_ / grid_.cell_volume();
   for (std::size_t p = 0; p < particles.owned; ++p) {
@@ -150,15 +147,18 @@ void Transfer::deposit_drag(const Drag& drag, const DragScene& scene, const Part
     const double b = drag(scene, norm(slip), at_place.sum(-1, gas.fraction.data()));
     drag_[p] = b;
     for (int d = 0; d < 3; ++d) {
-      double* coefficient = exchange.drag[d].data();
-      double* momentum = exchange.drag_momentum[d].data();
-      double* solids = exchange.buoyancy[d].data();
-      const double b_velocity = b * velocity[d];
-      at_place.each(d, [&](std::ptrdiff_t at, double weight) {
-        coefficient[at] += b * weight;
-        momentum[at] += b_velocity * weight;
-        solids[at] += share * weight;
-      });
+      Share* shares = shares_[d].data();
+      const Share whole{b, b * velocity[d], share, 0};
+      at_place.each(d, [&](std::ptrdiff_t at, double weight) { shares[at] += weight * whole; });
+    }
+  }
+  for (int d = 0; d < 3; ++d) {
+    double *drags = exchange.drag[d].data(), *momenta = exchange.drag_momentum[d].data(), *solids = exchange.buoyancy[d].data();
+    const Share* shares = shares_[d].data();
+    for (std::size_t at = 0; at < shares_[d].size(); ++at) {
+      drags[at] = shares[at][0];
+      momenta[at] = shares[at][1];
+      solids[at] = shares[at][2];
     }
   }
   halo_.add(exchange.drag);

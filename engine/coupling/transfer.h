@@ -49,7 +49,8 @@ class Transfer {
   double at(const Field& field, Vec3 place) const;
 
  private:
-  struct Weights;  // stencils of one particle on both lattices of each direction
+  using Share = double __attribute__((vector_size(32)));  // b, bV, solids of a face, and nothing: added as one
+  struct Weights;                                         // stencils of one particle on both lattices of each direction
   Weights weights(Vec3 place) const;
   bool has_faces(int d) const { return lowest_face_[d] <= highest_face_[d]; }
   double node_volume(int d, int face) const;  // in cells
@@ -61,8 +62,9 @@ class Transfer {
   double particle_volume_, fraction_floor_;
   PhaseTimer& timer_;
   Int3 lowest_cell_{}, highest_cell_{}, lowest_face_{}, highest_face_{};
-  std::vector<double> drag_;  // b of each owned particle, kg/s
-  FaceField gradient_;        // ∇p as the particles feel it, Pa/m
+  std::vector<double> drag_;                  // b of each owned particle, kg/s
+  std::array<std::vector<Share>, 3> shares_;  // of the faces of each direction, in a field's order
+  FaceField gradient_;                        // ∇p as the particles feel it, Pa/m
   FaceField buoyancy_share_;  // share of ∇p that acts on particles: 1 but where the floor limits the solids of a face
 };
 

@@ -17,7 +17,7 @@ struct DragScene {
   double diameter = 0;   // d, m
 };
 
-// Wen & Yu (1966) with the factor ε^−1.65 on C_D; METHOD: switch to Newton's range at Re = 1000.
+// Wen & Yu (1966) with the factor ε^−1.65 on C_D; switched to Newton's range at Re = 1000.
 //   Re ≤ 1000:  b = 3π μ d (1 + 0.15 Re^0.687) ε^−2.65        else:  b = ½·0.44 ρg v π r² ε^−1.65
 struct WenYu {
   static constexpr const char* name = "wen_yu";

@@ -1,4 +1,4 @@
-// Symplectic Euler: V and ω with the forces at the old place, X with the new V (METHOD: what the MFiX family calls Euler).
+// Symplectic Euler: V and ω with the forces at the old place, X with the new V (what the MFiX family of codes calls Euler).
 #pragma once
 
 #include <vector>

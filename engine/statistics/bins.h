@@ -1,4 +1,4 @@
-// Time averages over non-overlapping bins (METHOD section 7).
+// Time averages over non-overlapping bins.
 //
 // Bin i covers T0 + i Tb < t ≤ T0 + (i+1) Tb, i = 0 … N−1, and takes the steps that end in it, each weighted with the whole of
 // its length: a step that straddles a bin's edge counts to the bin that holds its end. Round-off in the time does not

@@ -11,7 +11,7 @@
 
 namespace bedflow {
 
-// Müller's spheres (CASES.md) in a box without gravity.
+// Müller's spheres in a box without gravity.
 struct Spheres {
   double diameter = 1.2e-3, density = 1000, stiffness = 440, restitution = 0.97, friction = 0.1;
   Vec3 gravity{};

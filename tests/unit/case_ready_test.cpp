@@ -29,7 +29,7 @@ double mass(const v1::Particles& particles) {
   return particles.density() * std::numbers::pi / 6 * std::pow(particles.diameter(), 3);
 }
 
-// METHOD: τ = π / √(k/m* − (η/2m*)²) with m* = m/2 and η = 2 √(m* k) |ln e| / √(π² + ln² e).
+// τ = π / √(k/m* − (η/2m*)²) with m* = m/2 and η = 2 √(m* k) |ln e| / √(π² + ln² e).
 double collision_time(const v1::Particles& particles) {
   const double k = particles.linear_spring_dashpot().stiffness();
   const double log_e = std::log(particles.linear_spring_dashpot().restitution());

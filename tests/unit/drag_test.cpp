@@ -13,7 +13,7 @@ TEST(Drag, WenYuTendsToStokesForOneSlowParticleInClearGas) {
 
 TEST(Drag, WenYuSwitchesAtReynolds1000WithTheGapOfTheCorrelations) {
   const double at_1000 = 1000 * scene.viscosity / (scene.density * scene.diameter);
-  // 24/1000 (1 + 0.15·1000^0.687) = 0.4383 against 0.44: METHOD section 8 says less than 0.4 %.
+  // 24/1000 (1 + 0.15·1000^0.687) = 0.4383 against 0.44: a gap of less than 0.4 %.
   const double below = WenYu{}(scene, at_1000 * (1 - 1e-12), 1.0), above = WenYu{}(scene, at_1000 * (1 + 1e-12), 1.0);
   EXPECT_NEAR(below / above, 0.024 * (1 + 0.15 * std::pow(1000, 0.687)) / 0.44, 1e-10);
   EXPECT_NEAR(below / above, 1, 0.004);

@@ -39,7 +39,7 @@ void run(Simulation& simulation, int steps) {
 
 class Resume : public testing::TestWithParam<std::string> {};
 
-// The claim of METHOD and SERVICE: same binary, case and ranks give the same bits, run through or stopped and resumed.
+// Same binary, case and ranks give the same bits, run through or stopped and resumed.
 TEST_P(Resume, IsTheUninterruptedRunBitForBit) {
   const Comm world = Comm::world();
   const Plan plan = make_plan(scene_of(world, small_bed(GetParam())), world.size());

@@ -39,7 +39,7 @@ double mean_restitution(bool on_wall, double restitution, int steps_per_time) {
 TEST(Contact, ReboundSpeedIsRestitutionTimesImpactSpeed) {
   for (const bool on_wall : {false, true})
     for (const double e : {0.8, 0.9, 0.97}) {
-      EXPECT_NEAR(mean_restitution(on_wall, e, 20), e, 0.003 * e) << e;  // METHOD: scatter of the phase averages out
+      EXPECT_NEAR(mean_restitution(on_wall, e, 20), e, 0.003 * e) << e;  // the scatter of the phase averages out
       EXPECT_NEAR(mean_restitution(on_wall, e, 50), e, 0.001 * e) << e;
     }
 }

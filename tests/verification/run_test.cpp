@@ -141,6 +141,18 @@ TEST_F(JobRun, EveryReasonToStopHasItsName) {
       Reason::particle_lost);
 }
 
+TEST_F(JobRun, ASceneThatDoesNotFitIntoMemoryIsToldAsSuch) {
+  if (comm.size() > 1) GTEST_SKIP() << "the ranks would be ended by MPI";
+  const std::string huge = std::regex_replace(short_bed(), std::regex("y: 14 z: 4"), "y: 4096 z: 4096");
+  const auto path = fresh("huge", std::regex_replace(std::regex_replace(huge, std::regex("cells \\{ x: 6"), "cells { x: 4096"),
+                                                     std::regex("size \\{ [^}]*\\}"), "size { x: 100 y: 100 z: 100 }"));
+  EXPECT_EXIT(run(comm, {path, 0, std::nullopt}), testing::ExitedWithCode(static_cast<int>(Reason::out_of_memory)),
+              "out of memory");
+  const auto all = events(path);
+  ASSERT_TRUE(!all.empty() && all.back().has_stopped());
+  EXPECT_EQ(all.back().stopped().reason(), v1::OUT_OF_MEMORY);
+}
+
 TEST_F(JobRun, EventsAreNumberedWithoutAGapOverAllAttempts) {
   const auto path = fresh("twice", short_bed());
   put(comm, path / "control.txtpb", "sequence: 1 command: SUSPEND");
