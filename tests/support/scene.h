@@ -42,6 +42,11 @@ inline Scene scene_of(const Comm& comm, const std::string& case_text) {
   return read_scene(folder.path() / "case.txtpb");
 }
 
+// The text with `old`, which must be there, replaced.
+inline std::string with(std::string text, const std::string& old, const std::string& replacement) {
+  return text.replace(text.find(old), old.size(), replacement);
+}
+
 // A small fluidized bed: 15 × 36 × 10 mm, 600 particles, walls all round, both laws with and without history.
 inline std::string small_bed(const std::string& tangential, const std::string& more = "") {
   return R"(name: "small-bed"

@@ -100,9 +100,7 @@ void expect_alike(const Found& a, const Found& b) {
   EXPECT_EQ(a.contacts, b.contacts);
 }
 std::string tight_bed() {
-  std::string text = small_bed(spring);
-  const std::string loose = "simple {}";
-  return text.replace(text.find(loose), loose.size(), "simple { tolerance: 1e-9 pressure_tolerance: 1e-6 max_iterations: 2000 }");
+  return with(small_bed(spring), "simple {}", "simple { tolerance: 1e-9 pressure_tolerance: 1e-6 max_iterations: 2000 }");
 }
 
 TEST(Ranks, AgreeWithOneRank) {
@@ -167,8 +165,7 @@ TEST(Scene, ACheckpointOfAnotherSceneIsRefusedByField) {
   Simulation bed(make_plan(scene_of(world, small_bed(coulomb)), world.size()), world, timer);
   bed.seed();
   const CheckpointInfo info = write_checkpoint(world, folder.path(), bed.checkpoint(), 2);
-  std::string text = small_bed(coulomb);
-  Simulation other(make_plan(scene_of(world, text.replace(text.find("y: 14"), 5, "y: 15")), world.size()), world, timer);
+  Simulation other(make_plan(scene_of(world, with(small_bed(coulomb), "y: 14", "y: 15")), world.size()), world, timer);
   try {
     other.restore(CheckpointReader(world, info.path));
     FAIL() << "it was accepted";

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
-#include <regex>
 #include <sstream>
 
 #include "bedflow/v1/job.pb.h"
@@ -22,8 +21,7 @@ const std::string monitors = R"(
   monitors { name: "momentum" momentum_balance {} interval: 0 })";
 
 std::string short_bed() {
-  return std::regex_replace(small_bed("spring { friction: 0.3 }", monitors), std::regex("time \\{ end: 1 \\}"),
-                            "time { end: 0.004 }");
+  return with(small_bed("spring { friction: 0.3 }", monitors), "time { end: 1 }", "time { end: 0.004 }");
 }
 
 void put(const Comm& comm, const std::filesystem::path& path, const std::string& text) {
@@ -130,8 +128,7 @@ TEST_F(JobRun, EveryReasonToStopHasItsName) {
   EXPECT_EQ(run_in(cancelled), Reason::cancelled);
   EXPECT_EQ(run_in(fresh("limit", bed, "wall_limit_seconds: 1e-6")), Reason::wall_limit);
   EXPECT_EQ(run_in(fresh("nonsense", "name: 3")), Reason::invalid_case);
-  EXPECT_EQ(run_in(fresh("stubborn",
-                         std::regex_replace(bed, std::regex("simple \\{\\}"), "simple { tolerance: 1e-14 max_iterations: 2 }"))),
+  EXPECT_EQ(run_in(fresh("stubborn", with(bed, "simple {}", "simple { tolerance: 1e-14 max_iterations: 2 }"))),
             Reason::not_converged);
   // Without gravity and with a speed of its own, the one particle leaves through the open top.
   EXPECT_EQ(
@@ -143,9 +140,8 @@ TEST_F(JobRun, EveryReasonToStopHasItsName) {
 
 TEST_F(JobRun, ASceneThatDoesNotFitIntoMemoryIsToldAsSuch) {
   if (comm.size() > 1) GTEST_SKIP() << "the ranks would be ended by MPI";
-  const std::string huge = std::regex_replace(short_bed(), std::regex("y: 14 z: 4"), "y: 4096 z: 4096");
-  const auto path = fresh("huge", std::regex_replace(std::regex_replace(huge, std::regex("cells \\{ x: 6"), "cells { x: 4096"),
-                                                     std::regex("size \\{ [^}]*\\}"), "size { x: 100 y: 100 z: 100 }"));
+  const std::string wide = with(short_bed(), "size { x: 0.015 y: 0.036 z: 0.01 }", "size { x: 100 y: 100 z: 100 }");
+  const auto path = fresh("huge", with(wide, "cells { x: 6 y: 14 z: 4 }", "cells { x: 4096 y: 4096 z: 4096 }"));
   EXPECT_EXIT(run(comm, {path, 0, std::nullopt}), testing::ExitedWithCode(static_cast<int>(Reason::out_of_memory)),
               "out of memory");
   const auto all = events(path);
