@@ -80,10 +80,10 @@ Simulation::Simulation(const Plan& plan, const Comm& comm, PhaseTimer& timer)
 
 void Simulation::step() {
   double dt = std::min(step_size_, plan_.scene.end_time - time_);
-  if (coupling_) deposit_volume();                                                                 // particles -> ε, ∂ε/∂t
-  if (coupling_) deposit_drag();                                                                   // b and bV -> faces
-  if (gas_) dt = advance_gas(dt);                                                                  // U, p
-  if (coupling_) coupling_->transfer.sample(gas_->state, coupling_->exchange, dem_->particles());  // U, ∇p -> F_g
+  if (coupling_) deposit_volume();                                            // particles -> ε, ∂ε/∂t
+  if (coupling_) deposit_drag();                                              // b and bV -> faces
+  if (gas_) dt = advance_gas(dt);                                             // U, p
+  if (coupling_) coupling_->transfer.sample(gas_->state, dem_->particles());  // U, ∇p -> F_g
   if (audit_exchange_) audit_exchange();
   if (dem_) advance_particles(dt);  // contacts, walls, motion, in sub-steps
   time_ += dt;

@@ -88,6 +88,17 @@ double Transfer::node_volume(int d, int face) const {
   return volume;
 }
 
+// Calls take(i, j, k, node volume in cells) for every point of a face lattice that this rank owns.
+template <class Take>
+void Transfer::each_owned_face(int d, Take take) const {
+  Int3 low{0, 0, 0}, high = grid_.cells;
+  low[d] = std::max(0, lowest_face_[d]);
+  high[d] = std::min(grid_.cells[d] - 1, highest_face_[d]) + 1;
+  for (int k = low[2]; k < high[2]; ++k)
+    for (int j = low[1]; j < high[1]; ++j)
+      for (int i = low[0]; i < high[0]; ++i) take(i, j, k, node_volume(d, d == 0 ? i : d == 1 ? j : k));
+}
+
 double Transfer::deposit_volume(const ParticleStore& particles, Field& fraction) {
   const PhaseTimer::Scope scope(timer_, Phase::deposit, particles.owned);
   fraction.fill(0);
@@ -167,21 +178,15 @@ void Transfer::deposit_drag(const Drag& drag, const DragScene& scene, const Part
 
   // Per cell of the node; ∇p acts on no more solids than the floor of ε leaves room for, on both sides of the exchange.
   for (int d = 0; d < 3; ++d) {
-    const int first = std::max(0, lowest_face_[d]), last = std::min(grid_.cells[d] - 1, highest_face_[d]);
-    for (int k = 0; k < grid_.cells[2]; ++k)
-      for (int j = 0; j < grid_.cells[1]; ++j)
-        for (int i = 0; i < grid_.cells[0]; ++i) {
-          const int face = d == 0 ? i : d == 1 ? j : k;
-          if (face < first || face > last) continue;
-          const double node = node_volume(d, face);
-          exchange.drag[d](i, j, k) /= node;
-          exchange.drag_momentum[d](i, j, k) /= node;
-          double& solids = exchange.buoyancy[d](i, j, k);
-          solids /= node;
-          const double limited = std::min(solids, 1 - fraction_floor_);
-          buoyancy_share_[d](i, j, k) = solids > limited ? limited / solids : 1;
-          solids = limited;
-        }
+    each_owned_face(d, [&](int i, int j, int k, double node) {
+      exchange.drag[d](i, j, k) /= node;
+      exchange.drag_momentum[d](i, j, k) /= node;
+      double& solids = exchange.buoyancy[d](i, j, k);
+      solids /= node;
+      const double limited = std::min(solids, 1 - fraction_floor_);
+      buoyancy_share_[d](i, j, k) = solids > limited ? limited / solids : 1;
+      solids = limited;
+    });
   }
   halo_.fill(exchange.drag);
   halo_.fill(exchange.drag_momentum);
@@ -197,17 +202,12 @@ double Transfer::pressure_gradient(const Field& pressure, int d, std::ptrdiff_t 
   return (pressure.data()[at] - pressure.data()[at - grid_.stride(d)]) / grid_.spacing[d];
 }
 
-void Transfer::sample(const GasState& gas, const Exchange&, ParticleStore& particles) {
+void Transfer::sample(const GasState& gas, ParticleStore& particles) {
   const PhaseTimer::Scope scope(timer_, Phase::sample, particles.owned);
   for (int d = 0; d < 3; ++d) {
-    const int first = std::max(0, lowest_face_[d]), last = std::min(grid_.cells[d] - 1, highest_face_[d]);
-    for (int k = 0; k < grid_.cells[2]; ++k)
-      for (int j = 0; j < grid_.cells[1]; ++j)
-        for (int i = 0; i < grid_.cells[0]; ++i) {
-          const int face = d == 0 ? i : d == 1 ? j : k;
-          if (face < first || face > last) continue;
-          gradient_[d](i, j, k) = buoyancy_share_[d](i, j, k) * pressure_gradient(gas.pressure, d, grid_.index(i, j, k));
-        }
+    each_owned_face(d, [&](int i, int j, int k, double /*node*/) {
+      gradient_[d](i, j, k) = buoyancy_share_[d](i, j, k) * pressure_gradient(gas.pressure, d, grid_.index(i, j, k));
+    });
   }
   halo_.fill(gradient_);
   for (std::size_t p = 0; p < particles.owned; ++p) {
@@ -236,18 +236,13 @@ ExchangeBalance Transfer::balance(const GasState& gas, const Exchange& exchange,
       sums[6 + d] += std::abs(particles.gas_force[p][d]);
     }
   for (int d = 0; d < 3; ++d) {
-    const int first = std::max(0, lowest_face_[d]), last = std::min(grid_.cells[d] - 1, highest_face_[d]);
-    for (int k = 0; k < grid_.cells[2]; ++k)
-      for (int j = 0; j < grid_.cells[1]; ++j)
-        for (int i = 0; i < grid_.cells[0]; ++i) {
-          const int face = d == 0 ? i : d == 1 ? j : k;
-          if (face < first || face > last) continue;
-          const double drag = exchange.drag[d](i, j, k) * gas.velocity[d](i, j, k) - exchange.drag_momentum[d](i, j, k);
-          const double buoyancy =
-              -grid_.cell_volume() * exchange.buoyancy[d](i, j, k) * pressure_gradient(gas.pressure, d, grid_.index(i, j, k));
-          sums[d] += node_volume(d, face) * (drag + buoyancy);
-          sums[6 + d] += node_volume(d, face) * (std::abs(drag) + std::abs(buoyancy));
-        }
+    each_owned_face(d, [&](int i, int j, int k, double node) {
+      const double drag = exchange.drag[d](i, j, k) * gas.velocity[d](i, j, k) - exchange.drag_momentum[d](i, j, k);
+      const double buoyancy =
+          -grid_.cell_volume() * exchange.buoyancy[d](i, j, k) * pressure_gradient(gas.pressure, d, grid_.index(i, j, k));
+      sums[d] += node * (drag + buoyancy);
+      sums[6 + d] += node * (std::abs(drag) + std::abs(buoyancy));
+    });
   }
   decomposition_.comm().sum(sums);
   return {{sums[0], sums[1], sums[2]}, {sums[3], sums[4], sums[5]}, {sums[6], sums[7], sums[8]}};

@@ -40,7 +40,7 @@ class Transfer {
                     Exchange& exchange);
 
   // F_g = −𝒱 ∇p + b (U − V) of every particle into particles.gas_force, with the b of the last deposit_drag.
-  void sample(const GasState& gas, const Exchange& exchange, ParticleStore& particles);
+  void sample(const GasState& gas, ParticleStore& particles);
 
   // Sums what the gas lost in the step (from its own fields) and what the particles received. Collective.
   ExchangeBalance balance(const GasState& gas, const Exchange& exchange, const ParticleStore& particles) const;
@@ -54,6 +54,8 @@ class Transfer {
   Weights weights(Vec3 place) const;
   bool has_faces(int d) const { return lowest_face_[d] <= highest_face_[d]; }
   double node_volume(int d, int face) const;  // in cells
+  template <class Take>
+  void each_owned_face(int d, Take take) const;
   double pressure_gradient(const Field& pressure, int d, std::ptrdiff_t at) const;
 
   const Decomposition& decomposition_;

@@ -115,7 +115,7 @@ TEST(Transfer, WhatTheGasLosesTheParticlesReceive) {
     bed.stir_gas();
     bed.transfer.deposit_drag(GidaspowBlended{}, {1.2, 1.8e-5, 0.1}, bed.particles, bed.gas, bed.exchange);
     bed.stir_gas();
-    bed.transfer.sample(bed.gas, bed.exchange, bed.particles);
+    bed.transfer.sample(bed.gas, bed.particles);
     const ExchangeBalance balance = bed.transfer.balance(bed.gas, bed.exchange, bed.particles);
     for (int d = 0; d < 3; ++d) {
       EXPECT_GT(balance.scale[d], 0);
@@ -129,7 +129,7 @@ TEST(Transfer, ConstantsAreReproducedNextToWallsToo) {
   bed.gas.fraction.fill(0.4);
   for (int d = 0; d < 3; ++d) bed.gas.velocity[d].fill(3.0 + d);
   bed.transfer.deposit_drag(ConstantDrag{1}, {}, bed.particles, bed.gas, bed.exchange);
-  bed.transfer.sample(bed.gas, bed.exchange, bed.particles);
+  bed.transfer.sample(bed.gas, bed.particles);
   for (std::size_t p = 0; p < bed.particles.owned; ++p) {
     EXPECT_NEAR(bed.transfer.at(bed.gas.fraction, bed.particles.position[p]), 0.4, 1e-15);
     for (int d = 0; d < 3; ++d) EXPECT_NEAR(bed.particles.gas_force[p][d] + bed.particles.velocity[p][d], 3.0 + d, 1e-14);
@@ -144,7 +144,7 @@ TEST(Transfer, AUniformPressureGradientPushesEveryParticleAlike) {
   bed.halo.fill(bed.gas.pressure);
   bed.transfer.deposit_volume(bed.particles, bed.gas.fraction);
   bed.transfer.deposit_drag(ConstantDrag{0}, {}, bed.particles, bed.gas, bed.exchange);
-  bed.transfer.sample(bed.gas, bed.exchange, bed.particles);
+  bed.transfer.sample(bed.gas, bed.particles);
   for (std::size_t p = 0; p < bed.particles.owned; ++p) {
     EXPECT_NEAR(bed.particles.gas_force[p].y / (50 * Bed::volume), 1, 1e-12);  // differences of pressures of up to 100 Pa
     EXPECT_EQ(bed.particles.gas_force[p].x, 0);

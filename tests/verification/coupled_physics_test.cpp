@@ -52,7 +52,7 @@ double fall_by_transfer(const DragScene& gas, double density, double gravity, do
   for (int s = 0; s < steps; ++s) {
     transfer.deposit_volume(dem.particles(), state.fraction);
     transfer.deposit_drag(WenYu{}, gas, dem.particles(), state, exchange);
-    transfer.sample(state, exchange, dem.particles());
+    transfer.sample(state, dem.particles());
     dem.advance(200, time / steps / 200, contact, PairAndWall<Frictionless>{});
   }
   return -dem.particles().velocity[0].y;
