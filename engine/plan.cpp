@@ -12,11 +12,13 @@ namespace bedflow {
 
 namespace {
 
-// Measured on the Müller bed, fluidized, one core (deploy/bench.sh bed prints them anew); they make the estimate of the wall time
-// and nothing else. A resting bed costs up to twice as much a sub-step, a dilute one half.
-constexpr double particle_substep_seconds = 0.05e-6;  // without history; a history adds a third
-constexpr double particle_step_seconds = 0.3e-6;      // to the grid and back
-constexpr double cell_step_seconds = 0.4e-6;          // two outer iterations of SIMPLE
+// Measured on the Müller bed, one core (deploy/bench.sh bed and dem print them anew); they make the estimate of the wall time and
+// nothing else.
+constexpr double fluidized_substep_seconds = 0.014e-6;  // a particle, without history
+constexpr double resting_substep_seconds = 0.065e-6;    // the same in a bed at rest, five contacts each
+constexpr double history_factor = 1.35;
+constexpr double particle_step_seconds = 0.18e-6;  // to the grid and back
+constexpr double cell_step_seconds = 0.25e-6;      // two outer iterations of SIMPLE
 
 std::string number(double value) {
   char text[32];
@@ -112,13 +114,14 @@ void plan_cost(Plan& plan) {
                       particles * (24.0 * (rotation ? 8 : 5) + 16 + 8 * (4 + (history ? 25 : 0)));
   plan.checkpoint_bytes = 100e3 + field * 5 + particles * (8 + 24.0 * (rotation ? 4 : 3) + (history ? 3 * 40 : 0));
   const auto steps = static_cast<double>(plan.steps);
-  const double substep = particles * particle_substep_seconds * (history ? 1.33 : 1);
+  const double factor = particles * (history ? history_factor : 1);
+  const double substep = factor * (scene.coupling ? fluidized_substep_seconds : resting_substep_seconds);
   plan.seconds =
       steps * (cells * cell_step_seconds + (scene.coupling ? particles * particle_step_seconds : 0) + plan.substeps * substep);
   if (const auto* random = scene.particles ? std::get_if<RandomPlaces>(&scene.particles->places) : nullptr;
       random && random->settling) {
     const double fall = 1.2 * std::sqrt(2 * random->seeds.high.y / norm(scene.gravity));  // it is at rest soon after
-    plan.seconds += std::min(fall, random->settling->duration) / plan.substep * substep;
+    plan.seconds += std::min(fall, random->settling->duration) / plan.substep * factor * resting_substep_seconds;
   }
   plan.seconds /= plan.ranks;
 }
