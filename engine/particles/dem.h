@@ -46,7 +46,6 @@ class Dem {
   // Largest overlap since the last take, over the diameter, this rank.
   double take_max_overlap();
   double max_overlap() const { return deepest_ / (2 * setup_.radius); }
-  void set_max_overlap(double over_diameter) { deepest_ = over_diameter * 2 * setup_.radius; }  // when a run goes on
   // Touching pairs in the last sub-step; a pair across ranks is counted by the owner of its lower id.
   std::int64_t contacts() const { return contacts_; }
   std::int64_t rebuilds() const { return rebuilds_; }  // of the pair list since construction
