@@ -219,7 +219,8 @@ TEST(Bed, LiftsAtTheMinimumFluidizationVelocityAndThenWeighsWhatItWeighs) {
       ++samples;
     }
   }
-  // Within a plane ε varies by ±0.03 a cell and the gas prefers the loose cells: less drop than the mean ε's, a later lift.
+  // Within a plane ε varies by ±0.03 a cell and the gas prefers the loose cells: less drop than the mean ε's, a later lift:
+  // 1.018 here. The band was set before that was measured.
   EXPECT_NEAR(lifted_at / minimum, 1.03, 0.04) << "U_mf by Ergun: " << minimum;
   ASSERT_GT(samples, 100);
   // Bubbles and the bed's own acceleration move the drop around the weight; the mean of this much time is within 5 %.
