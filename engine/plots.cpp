@@ -4,15 +4,6 @@
 
 namespace bedflow {
 
-namespace {
-
-template <class T>
-std::vector<T> owned(const std::vector<T>& values, std::size_t count) {
-  return {values.begin(), values.begin() + static_cast<std::ptrdiff_t>(count)};
-}
-
-}  // namespace
-
 void write_plot_files(const Comm& comm, const std::filesystem::path& folder, const Simulation& simulation) {
   if (const Grid* grid = simulation.grid()) {
     Simulation::GasPlot gas = simulation.gas_plot();
@@ -25,13 +16,14 @@ void write_plot_files(const Comm& comm, const std::filesystem::path& folder, con
     const ParticleStore& store = dem->particles();
     const std::size_t n = store.owned;
     std::vector<double> speed(n);
-    for (std::size_t p = 0; p < n; ++p) speed[p] = norm(store.velocity[p]);
-    std::vector<PlotArray> arrays{{"id", "", owned(store.id, n)},
-                                  {"velocity", "m/s", owned(store.velocity, n)},
-                                  {"speed", "m/s", std::move(speed)},
-                                  {"diameter", "m", std::vector<double>(n, 2 * dem->setup().radius)}};
-    if (dem->setup().rotation) arrays.push_back({"spin", "rad/s", owned(store.spin, n)});
-    write_particle_plot(comm, folder, simulation.steps(), simulation.time(), std::span(store.position).first(n), arrays);
+    for (std::size_t p = 0; p < n; ++p) speed[p] = norm(store.velocity(p));
+    std::vector<PlotArray> arrays{
+        {"id", "", std::vector<std::int64_t>(store.id.begin(), store.id.begin() + static_cast<std::ptrdiff_t>(n))},
+        {"velocity", "m/s", store.velocities()},
+        {"speed", "m/s", std::move(speed)},
+        {"diameter", "m", std::vector<double>(n, 2 * dem->setup().radius)}};
+    if (dem->setup().rotation) arrays.push_back({"spin", "rad/s", store.spins()});
+    write_particle_plot(comm, folder, simulation.steps(), simulation.time(), store.positions(), arrays);
   }
 }
 

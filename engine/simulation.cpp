@@ -178,7 +178,7 @@ void Simulation::seed() {
   if (dem_) {
     const ParticleScene& particles = *plan_.scene.particles;
     ParticleStore seeds = std::visit(Seeder{decomposition_, particles.diameter / 2}, particles.places);
-    dem_->set_particles(std::move(seeds.position), std::move(seeds.velocity), std::move(seeds.spin), std::move(seeds.id));
+    dem_->set_particles(std::move(seeds));
     particle_count_ = decomposition_.comm().sum(static_cast<std::int64_t>(dem_->particles().owned));
   }
   if (coupling_) hidden_solids_ = coupling_->transfer.deposit_volume(dem_->particles(), gas_->state.fraction);
@@ -219,7 +219,6 @@ Observation Simulation::observation() {
     now.particles = &dem_->particles();
     now.radius = plan_.scene.particles->diameter / 2;
     now.mass = plan_.scene.particles->mass;
-    now.rotation = dem_->setup().rotation;
     now.max_overlap = max_overlap_;
   }
   return now;

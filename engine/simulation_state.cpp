@@ -90,14 +90,14 @@ CheckpointContent Simulation::checkpoint() const {
     content.numbers["particles/count"] = static_cast<double>(particle_count_);
     content.numbers["particles/total_mass"] = static_cast<double>(particle_count_) * plan_.scene.particles->mass;
     Vec3 momentum;
-    for (std::size_t p = 0; p < n; ++p) momentum += plan_.scene.particles->mass * store.velocity[p];
+    for (std::size_t p = 0; p < n; ++p) momentum += plan_.scene.particles->mass * store.velocity(p);
     for (int d = 0; d < 3; ++d) {
       content.numbers[std::string("particles/total_momentum_") + "xyz"[d]] = decomposition_.comm().sum(momentum[d]);
     }
-    content.arrays.push_back(rows("particles/position", "m", "centres", std::span(store.position).first(n)));
-    content.arrays.push_back(rows("particles/velocity", "m/s", "velocities V", std::span(store.velocity).first(n)));
+    content.arrays.push_back(rows("particles/position", "m", "centres", store.positions()));
+    content.arrays.push_back(rows("particles/velocity", "m/s", "velocities V", store.velocities()));
     if (dem_->setup().rotation) {
-      content.arrays.push_back(rows("particles/spin", "rad/s", "angular velocities ω", std::span(store.spin).first(n)));
+      content.arrays.push_back(rows("particles/spin", "rad/s", "angular velocities ω", store.spins()));
     }
     content.arrays.push_back({"particles/id", "", "identity, for life",
                               std::vector<std::int64_t>(store.id.begin(), store.id.begin() + static_cast<std::ptrdiff_t>(n)),
@@ -170,13 +170,12 @@ void Simulation::restore_gas(const CheckpointReader& from) {
 void Simulation::restore_particles(const CheckpointReader& from) {
   const bool same_ranks = from.ranks() == decomposition_.comm().size();
   ParticleStore store;
-  store.position = vectors(from.rows("particles/position"));
-  store.velocity = vectors(from.rows("particles/velocity"));
-  if (dem_->setup().rotation) {
-    store.spin = from.has("particles/spin") ? vectors(from.rows("particles/spin")) : std::vector<Vec3>(store.position.size());
-  }
-  store.id = from.integer_rows("particles/id");
-  store.owned = store.position.size();
+  const std::vector<Vec3> positions = vectors(from.rows("particles/position"));
+  const std::vector<Vec3> velocities = vectors(from.rows("particles/velocity"));
+  const std::vector<Vec3> spins =
+      from.has("particles/spin") ? vectors(from.rows("particles/spin")) : std::vector<Vec3>(positions.size());
+  const std::vector<std::int64_t> ids = from.integer_rows("particles/id");
+  for (std::size_t p = 0; p < ids.size(); ++p) store.add(ids[p], positions[p], velocities[p], spins[p]);
   std::vector<Vec3> at_rebuild;
   if (same_ranks) at_rebuild = vectors(from.rows("particles/position_at_rebuild"));
   if (!same_ranks) store = redistribute(decomposition_, store);

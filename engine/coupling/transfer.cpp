@@ -105,7 +105,7 @@ double Transfer::deposit_volume(const ParticleStore& particles, Field& fraction)
   double* solids = fraction.data();
   const double share = particle_volume_ / grid_.cell_volume();
   for (std::size_t p = 0; p < particles.owned; ++p) {
-    weights(particles.position[p]).each(-1, [&](std::ptrdiff_t at, double weight) { solids[at] += share * weight; });
+    weights(particles.position(p)).each(-1, [&](std::ptrdiff_t at, double weight) { solids[at] += share * weight; });
   }
   halo_.add(fraction);
 
@@ -151,8 +151,8 @@ void Transfer::deposit_drag(const Drag& drag, const DragScene& scene, const Part
   drag_.resize(particles.owned);
   const double share = particle_volume_ / grid_.cell_volume();
   for (std::size_t p = 0; p < particles.owned; ++p) {
-    const Weights at_place = weights(particles.position[p]);
-    const Vec3 velocity = particles.velocity[p];
+    const Weights at_place = weights(particles.position(p));
+    const Vec3 velocity = particles.velocity(p);
     Vec3 slip;
     for (int d = 0; d < 3; ++d) slip[d] = at_place.sum(d, gas.velocity[d].data()) - velocity[d];
     const double b = drag(scene, norm(slip), at_place.sum(-1, gas.fraction.data()));
@@ -211,7 +211,7 @@ void Transfer::sample(const GasState& gas, ParticleStore& particles) {
   }
   halo_.fill(gradient_);
   for (std::size_t p = 0; p < particles.owned; ++p) {
-    const Weights at_place = weights(particles.position[p]);
+    const Weights at_place = weights(particles.position(p));
     const double b = drag_[p];
     for (int d = 0; d < 3; ++d) {
       const double* velocity = gas.velocity[d].data();
@@ -221,7 +221,7 @@ void Transfer::sample(const GasState& gas, ParticleStore& particles) {
         u += weight * velocity[at];
         slope += weight * gradient[at];
       });
-      particles.gas_force[p][d] = b * (u - particles.velocity[p][d]) - particle_volume_ * slope;
+      particles.gas_force[p][d] = b * (u - particles.velocity(p)[d]) - particle_volume_ * slope;
     }
   }
 }

@@ -82,20 +82,22 @@ void GhostExchange::pass(int d, int side, std::size_t owned, std::vector<Vec3>& 
   stages_.push_back(std::move(stage));
 }
 
-void GhostExchange::forward(std::span<Vec3* const> arrays) {
+void GhostExchange::forward(std::span<const Column> columns) {
+  std::size_t width = 0;
+  for (const Column& column : columns) width += column.width;
   for (const Stage& stage : stages_) {
-    const std::size_t width = 3 * arrays.size();
     send_.resize(stage.send.size() * width);
     receive_.resize(stage.count * width);
     double* out = send_.data();
     for (const std::uint32_t i : stage.send)
-      for (const Vec3* array : arrays)
-        for (int d = 0; d < 3; ++d) *out++ = array[i][d];
+      for (const Column& column : columns) out = std::copy_n(column.data + i * column.stride, column.width, out);
     decomposition_.comm().exchange(stage.to, send_, stage.from, std::span(receive_));
     const double* in = receive_.data();
     for (std::size_t i = stage.first; i < stage.first + stage.count; ++i)
-      for (Vec3* array : arrays)
-        for (int d = 0; d < 3; ++d) array[i][d] = *in++;
+      for (const Column& column : columns) {
+        std::copy_n(in, column.width, column.data + i * column.stride);
+        in += column.width;
+      }
   }
 }
 

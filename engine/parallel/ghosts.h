@@ -21,8 +21,13 @@ class GhostExchange {
   // Chooses the ghosts anew by the places of the owned particles (m, as their owners have them) and appends the ghosts' places
   // and ids.
   void choose(std::vector<Vec3>& place, std::vector<std::int64_t>& id);
-  // Brings the owned rows of each array to the ghosts that were chosen. Arrays hold owned + ghosts; no allocation.
-  void forward(std::span<Vec3* const> arrays);
+  // The first `width` doubles of each row of an array over owned + ghosts, rows `stride` doubles apart.
+  struct Column {
+    double* data;
+    std::size_t stride, width;
+  };
+  // Brings the owned rows of each column to the ghosts that were chosen. No allocation.
+  void forward(std::span<const Column> columns);
 
   // Of each ghost: what to add to its place to stand beside this block, m.
   const std::vector<Vec3>& shifts() const { return shift_; }

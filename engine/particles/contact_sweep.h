@@ -17,9 +17,7 @@ namespace bedflow {
 
 // Rows of owned + ghosts; torque and spin only where the law makes particles rotate.
 struct Bodies {
-  const Vec3* position;
-  const Vec3* velocity;
-  const Vec3* spin;
+  const ParticleStore& particles;
   Vec3* force;
   Vec3* torque;
   std::size_t owned;
@@ -28,7 +26,7 @@ struct Bodies {
   // From one row of a pair to the other; with a ghost among them, the way its nearest image stands.
   template <bool with_ghost>
   Vec3 apart(PairList::Pair pair) const {
-    const Vec3 direct = position[pair.high] - position[pair.low];
+    const Vec3 direct = particles.position(pair.high) - particles.position(pair.low);
     if constexpr (!with_ghost) return direct;
     return direct + (pair.low < owned ? shift[pair.high - owned] : -shift[pair.low - owned]);
   }
@@ -61,13 +59,13 @@ double sweep_pairs(PairList& list, const std::uint32_t* touching, std::size_t co
     const Vec3 apart = bodies.apart<with_ghost>(pair);
     const double distance = norm(apart), overlap = 2 * radius - distance;
     const Vec3 n = 1 / distance * apart;
-    const Vec3 v = bodies.velocity[a] - bodies.velocity[b];
+    const Vec3 v = bodies.particles.velocity(a) - bodies.particles.velocity(b);
     const double approach = dot(v, n), normal = contact(overlap, approach);
     deepest = std::max(deepest, overlap);
     Vec3 force = -normal * n;
     if constexpr (Tangential::rotation) {
       const double arm = 0.5 * distance;
-      const Vec3 slip = v - approach * n + cross(arm * (bodies.spin[a] + bodies.spin[b]), n);
+      const Vec3 slip = v - approach * n + cross(arm * (bodies.particles.spin(a) + bodies.particles.spin(b)), n);
       const Sliding sliding{n, slip, std::abs(normal), mass / 7, dt};  // 2/7 m*, m* = m/2
       Vec3 friction;
       if constexpr (Tangential::history) {
@@ -98,18 +96,18 @@ WallSweep sweep_walls(PairList& list, const std::array<Plane, 6>& faces, const D
   WallSweep result;
   for (std::size_t w = 0; w < list.near.size(); ++w) {
     const auto [i, face] = list.near[w];
-    const double distance = faces[face].distance(bodies.position[i]), overlap = setup.radius - distance;
+    const double distance = faces[face].distance(bodies.particles.position(i)), overlap = setup.radius - distance;
     result.passed |= !(distance >= 0);
     if (!(overlap > 0) || setup.sides[face / 2][face % 2] == Side::open) {
       if constexpr (Tangential::history) list.wall_history[w] = {};
       continue;
     }
-    const Vec3 n = -faces[face].normal, v = bodies.velocity[i];
+    const Vec3 n = -faces[face].normal, v = bodies.particles.velocity(i);
     const double approach = dot(v, n), normal = contact(overlap, approach);
     result.deepest = std::max(result.deepest, overlap);
     Vec3 force = -normal * n;
     if constexpr (Tangential::rotation) {
-      const Vec3 slip = v - approach * n + cross(distance * bodies.spin[i], n);
+      const Vec3 slip = v - approach * n + cross(distance * bodies.particles.spin(i), n);
       const Sliding sliding{n, slip, std::abs(normal), 2 * setup.mass / 7, dt};  // m* = m
       Vec3 friction;
       if constexpr (Tangential::history) {

@@ -34,21 +34,13 @@ Dem::Dem(const Decomposition& decomposition, const DemSetup& setup, PhaseTimer& 
       ghosts_(decomposition, reach()) {}
 
 Bodies Dem::bodies() {
-  return {particles_.position.data(), particles_.velocity.data(), particles_.spin.data(), force_.data(), torque_.data(),
-          particles_.owned,           ghosts_.shifts().data()};
+  return {particles_, force_.data(), torque_.data(), particles_.owned, ghosts_.shifts().data()};
 }
 
 // ---------------------------------------------------------------------------------------------------- state
 
-void Dem::set_particles(std::vector<Vec3> position, std::vector<Vec3> velocity, std::vector<Vec3> spin,
-                        std::vector<std::int64_t> id) {
-  ParticleStore store;
-  store.owned = position.size();
-  store.position = std::move(position);
-  store.velocity = std::move(velocity);
-  store.spin = std::move(spin);
-  store.id = std::move(id);
-  restore(std::move(store), {}, {}, {});
+void Dem::set_particles(ParticleStore particles) {
+  restore(std::move(particles), {}, {}, {});
 }
 
 void Dem::restore(ParticleStore particles, std::vector<Vec3> positions_at_rebuild, const std::vector<PairHistory>& pairs,
@@ -57,8 +49,10 @@ void Dem::restore(ParticleStore particles, std::vector<Vec3> positions_at_rebuil
   const Comm& comm = decomposition_.comm();
   particles_ = std::move(particles);
   drop_ghosts();
+  if (!setup_.rotation)
+    for (std::size_t i = 0; i < particles_.owned; ++i) particles_.set_spin(i, {});
   const bool fresh = !comm.any(!positions_at_rebuild.empty());
-  place_ = fresh ? particles_.position : std::move(positions_at_rebuild);
+  place_ = fresh ? particles_.positions() : std::move(positions_at_rebuild);
   failure_ = {};
   contacts_ = 0;
   look_for_lost(0);
@@ -81,7 +75,7 @@ void Dem::restore(ParticleStore particles, std::vector<Vec3> positions_at_rebuil
   }
   if (fresh) {
     migrate(decomposition_, setup_, particles_, history_);
-    place_ = particles_.position;
+    place_ = particles_.positions();
   }
   build_list();
 }
@@ -113,8 +107,8 @@ double Dem::take_max_overlap() {
 double Dem::kinetic_energy() const {
   double translation = 0, rotation = 0;
   for (std::size_t i = 0; i < particles_.owned; ++i) {
-    translation += dot(particles_.velocity[i], particles_.velocity[i]);
-    if (setup_.rotation) rotation += dot(particles_.spin[i], particles_.spin[i]);
+    translation += dot(particles_.velocity(i), particles_.velocity(i));
+    rotation += dot(particles_.spin(i), particles_.spin(i));
   }
   return 0.5 * (setup_.mass * translation + setup_.inertia() * rotation);
 }
@@ -122,17 +116,15 @@ double Dem::kinetic_energy() const {
 // ---------------------------------------------------------------------------------------------------- pair list
 
 void Dem::drop_ghosts() {
-  const std::size_t owned = particles_.owned;
-  particles_.position.resize(owned);
-  particles_.velocity.resize(owned);
-  particles_.spin.resize(setup_.rotation ? owned : 0);
-  particles_.id.resize(owned);
-  particles_.gas_force.resize(setup_.gas ? owned : 0);
+  particles_.resize(particles_.owned);
+  particles_.gas_force.resize(setup_.gas ? particles_.owned : 0);
 }
 
 void Dem::forward_ghosts() {
-  Vec3* const arrays[] = {particles_.position.data(), particles_.velocity.data(), particles_.spin.data()};
-  ghosts_.forward(std::span(arrays).first(setup_.rotation ? 3 : 2));
+  constexpr std::size_t row = sizeof(ParticleRow) / sizeof(double);
+  const GhostExchange::Column columns[] = {{&particles_.rows.data()->position.x, row, setup_.rotation ? row : 6},
+                                           {particles_.spin_z.data(), 1, 1}};
+  ghosts_.forward(std::span(columns).first(setup_.rotation ? 2 : 1));
 }
 
 void Dem::rebuild() {
@@ -147,7 +139,7 @@ void Dem::rebuild() {
     const PhaseTimer::Scope migration(timer_, Phase::migration, particles_.owned);
     migrate(decomposition_, setup_, particles_, history_);
   }
-  place_ = particles_.position;
+  place_ = particles_.positions();
   build_list();
   ++rebuilds_;
 }
@@ -155,9 +147,12 @@ void Dem::rebuild() {
 // Sorts by the places at the rebuild, which leaves a stored order as it is, and builds the list from them.
 void Dem::build_list() {
   cells_.sort(place_, reach());
-  for (auto* rows : {&particles_.position, &particles_.velocity, &particles_.spin, &particles_.gas_force, &place_})
-    reorder(*rows, cells_.order(), scratch_);
+  for (auto* vectors : {&particles_.gas_force, &place_}) reorder(*vectors, cells_.order(), scratch_);
+  std::vector<ParticleRow> rows;
+  std::vector<double> spins_z;
   std::vector<std::int64_t> ids;
+  reorder(particles_.rows, cells_.order(), rows);
+  reorder(particles_.spin_z, cells_.order(), spins_z);
   std::vector<std::int32_t> heads;
   reorder(particles_.id, cells_.order(), ids);
   reorder(history_.heads(), cells_.order(), heads);
@@ -166,8 +161,8 @@ void Dem::build_list() {
   {
     const PhaseTimer::Scope scope(timer_, Phase::migration, particles_.owned);
     ghosts_.choose(all_places_, particles_.id);
-    for (auto* rows : {&particles_.position, &particles_.velocity}) rows->resize(all_places_.size());
-    if (setup_.rotation) particles_.spin.resize(all_places_.size());
+    particles_.rows.resize(all_places_.size());
+    particles_.spin_z.resize(all_places_.size());
     forward_ghosts();
   }
   list_.build(cells_, setup_, faces_, particles_, all_places_, ghosts_.shifts());
@@ -202,7 +197,7 @@ void Dem::look_for_lost(double dt) {
 // Whether the particle is lost; says why. Nothing else may rely on a particle that has moved further than half a skin and its
 // diameter at once: it would jump over others, and over blocks.
 bool Dem::judge(std::size_t row, double dt) {
-  const Vec3 x = particles_.position[row], v = particles_.velocity[row];
+  const Vec3 x = particles_.position(row), v = particles_.velocity(row);
   const auto say = [&](Reason reason, const std::string& what) {
     std::ostringstream message;
     message << "particle " << particles_.id[row] << " " << what << ": at (" << x.x << ", " << x.y << ", " << x.z

@@ -34,9 +34,8 @@ class Dem {
   const ParticleStore& particles() const { return particles_; }
   ParticleStore& particles() { return particles_; }
 
-  // Replaces all particles of this rank, each inside this rank's block (ghosts are made here). spin may be empty. Collective.
-  void set_particles(std::vector<Vec3> position, std::vector<Vec3> velocity, std::vector<Vec3> spin,
-                     std::vector<std::int64_t> id);
+  // Replaces all particles of this rank, each inside this rank's block (ghosts are made here). Collective.
+  void set_particles(ParticleStore particles);
 
   // n sub-steps of dt (s): contact sweep, walls, integrate; then pairs (rebuilt only when needed) or ghosts; symplectic Euler.
   // Explicitly instantiated for every law of models/ in dem.cpp. Collective. After a failure on any rank no rank moves on.

@@ -18,14 +18,14 @@ bool integrate(const DemSetup& setup, ParticleStore& particles, std::vector<Vec3
   for (std::size_t i = 0; i < particles.owned; ++i) {
     Vec3 total = force[i];
     if constexpr (gas) total += particles.gas_force[i];
-    particles.velocity[i] += per_mass * total + fall;
-    particles.position[i] += dt * particles.velocity[i];
+    particles.velocity(i) += per_mass * total + fall;
+    particles.position(i) += dt * particles.velocity(i);
     force[i] = {};
     if constexpr (rotation) {
-      particles.spin[i] += per_inertia * torque[i];
+      particles.set_spin(i, particles.spin(i) + per_inertia * torque[i]);
       torque[i] = {};
     }
-    const Vec3 moved = particles.position[i] - place[i];
+    const Vec3 moved = particles.position(i) - place[i];
     far |= !(dot(moved, moved) <= limit2);
   }
   return far;

@@ -35,12 +35,26 @@ class Reader {
   const double* end_;
 };
 
-// The arrays beside the id, those that are there.
-std::vector<std::vector<Vec3>*> vectors_of(ParticleStore& store, bool spin, bool gas) {
-  std::vector<std::vector<Vec3>*> result{&store.position, &store.velocity};
-  if (spin) result.push_back(&store.spin);
-  if (gas) result.push_back(&store.gas_force);
-  return result;
+void put_particle(Message& message, const ParticleStore& store, std::size_t i, bool gas) {
+  message.push_back(packed(store.id[i]));
+  put(message, store.position(i));
+  put(message, store.velocity(i));
+  put(message, store.spin(i));
+  if (gas) put(message, store.gas_force[i]);
+}
+
+void take_particle(Reader& reader, ParticleStore& store, bool gas) {
+  const std::int64_t id = reader.integer();
+  const Vec3 position = reader.vector(), velocity = reader.vector(), spin = reader.vector();
+  store.add(id, position, velocity, spin);
+  if (gas) store.gas_force.push_back(reader.vector());
+}
+
+void move_particle(ParticleStore& store, std::size_t from, std::size_t to, bool gas) {
+  store.rows[to] = store.rows[from];
+  store.spin_z[to] = store.spin_z[from];
+  store.id[to] = store.id[from];
+  if (gas) store.gas_force[to] = store.gas_force[from];
 }
 
 // One stage: out of the block on one side of one direction.
@@ -59,19 +73,16 @@ class Stage {
 };
 
 // Moves the rows that leave into the message and closes the gaps, in order.
-void take_leaving(const Stage& stage, ParticleStore& store, ContactHistory& history,
-                  const std::vector<std::vector<Vec3>*>& vectors, Message& message) {
+void take_leaving(const Stage& stage, ParticleStore& store, ContactHistory& history, bool gas, Message& message) {
   std::size_t kept = 0;
   for (std::size_t i = 0; i < store.id.size(); ++i) {
-    if (!stage.leaves(store.position[i])) {
-      for (auto* array : vectors) (*array)[kept] = (*array)[i];
-      store.id[kept] = store.id[i];
+    if (!stage.leaves(store.position(i))) {
+      move_particle(store, i, kept, gas);
       history.heads()[kept++] = history.heads()[i];
       continue;
     }
-    message.push_back(packed(store.id[i]));
-    store.position[i] = stage.arrival(store.position[i]);
-    for (const auto* array : vectors) put(message, (*array)[i]);
+    store.position(i) = stage.arrival(store.position(i));
+    put_particle(message, store, i, gas);
     const std::size_t length_at = message.size();
     message.push_back(0);
     std::int64_t contacts = 0;
@@ -82,16 +93,14 @@ void take_leaving(const Stage& stage, ParticleStore& store, ContactHistory& hist
     });
     message[length_at] = packed(contacts);
   }
-  for (auto* array : vectors) array->resize(kept);
-  store.id.resize(kept);
+  store.resize(kept);
+  if (gas) store.gas_force.resize(kept);
   history.heads().resize(kept);
 }
 
-void append(const Message& message, ParticleStore& store, ContactHistory& history,
-            const std::vector<std::vector<Vec3>*>& vectors) {
+void append(const Message& message, ParticleStore& store, ContactHistory& history, bool gas) {
   for (Reader reader(message); reader;) {
-    store.id.push_back(reader.integer());
-    for (auto* array : vectors) array->push_back(reader.vector());
+    take_particle(reader, store, gas);
     const std::size_t row = history.append_particle();
     for (std::int64_t contacts = reader.integer(); contacts > 0; --contacts) {
       const std::int64_t other = reader.integer();
@@ -104,38 +113,28 @@ void append(const Message& message, ParticleStore& store, ContactHistory& histor
 
 void migrate(const Decomposition& decomposition, const DemSetup& setup, ParticleStore& particles, ContactHistory& history) {
   const Comm& comm = decomposition.comm();
-  const auto vectors = vectors_of(particles, setup.rotation, setup.gas);
   Message send, receive;
   for (int d = 0; d < 3; ++d)
     for (int side = 0; side < 2; ++side) {
       const int to = decomposition.neighbour(d, side), from = decomposition.neighbour(d, 1 - side);
       if (to < 0 && from < 0) continue;
       send.clear();
-      if (to >= 0) take_leaving(Stage(decomposition, d, side), particles, history, vectors, send);
+      if (to >= 0) take_leaving(Stage(decomposition, d, side), particles, history, setup.gas, send);
       comm.exchange(to, send, from, receive);
-      append(receive, particles, history, vectors);
+      append(receive, particles, history, setup.gas);
     }
-  particles.owned = particles.id.size();
+  particles.owned = particles.rows.size();
 }
 
 ParticleStore redistribute(const Decomposition& decomposition, const ParticleStore& particles) {
   const Comm& comm = decomposition.comm();
-  const bool spin = comm.any(!particles.spin.empty()), gas = comm.any(!particles.gas_force.empty());  // an empty rank cannot tell
-  ParticleStore source = particles, result;
-  const auto from = vectors_of(source, spin, gas);
-  const auto to = vectors_of(result, spin, gas);
+  const bool gas = comm.any(!particles.gas_force.empty());  // an empty rank cannot tell
   std::vector<Message> messages(comm.size());
-  for (std::size_t i = 0; i < particles.owned; ++i) {
-    Message& message = messages[decomposition.owner(particles.position[i])];
-    message.push_back(packed(particles.id[i]));
-    for (const auto* array : from) put(message, (*array)[i]);
-  }
+  for (std::size_t i = 0; i < particles.owned; ++i)
+    put_particle(messages[decomposition.owner(particles.position(i))], particles, i, gas);
+  ParticleStore result;
   for (const Message& message : comm.exchange_all(messages))
-    for (Reader reader(message); reader;) {
-      result.id.push_back(reader.integer());
-      for (auto* array : to) array->push_back(reader.vector());
-    }
-  result.owned = result.id.size();
+    for (Reader reader(message); reader;) take_particle(reader, result, gas);
   return result;
 }
 

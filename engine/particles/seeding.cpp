@@ -66,11 +66,7 @@ class Occupied {
 
 void keep_if_owned(const Decomposition& decomposition, ParticleStore& store, std::int64_t id, const PlacedSphere& sphere) {
   if (decomposition.owner(sphere.position) != decomposition.comm().rank()) return;
-  store.position.push_back(sphere.position);
-  store.velocity.push_back(sphere.velocity);
-  store.spin.push_back(sphere.spin);
-  store.id.push_back(id);
-  ++store.owned;
+  store.add(id, sphere.position, sphere.velocity, sphere.spin);
 }
 
 }  // namespace

@@ -17,7 +17,7 @@ template <class Law>
 void sum_over_particles(const Law& law, const StatisticScene& scene, const Observation& now, std::span<double> sums) {
   const ParticleStore& particles = *now.particles;
   for (std::size_t i = 0; i < particles.owned; ++i) {
-    law.add(scene, {particles.position[i], particles.velocity[i], now.rotation ? particles.spin[i] : Vec3{}}, sums);
+    law.add(scene, {particles.position(i), particles.velocity(i), particles.spin(i)}, sums);
   }
 }
 

@@ -36,10 +36,9 @@ struct Observation {
   const Field* fraction = nullptr;           // ε
   const ParticleStore* particles = nullptr;  // of this rank
   double radius = 0, mass = 0;               // of a particle, m, kg
-  bool rotation = false;
-  double max_overlap = 0;        // in the step, over the diameter, this rank
-  double mass_residual = 0;      // in the step, the same on every rank
-  double momentum_residual = 0;  // in the step, the same on every rank
+  double max_overlap = 0;                    // in the step, over the diameter, this rank
+  double mass_residual = 0;                  // in the step, the same on every rank
+  double momentum_residual = 0;              // in the step, the same on every rank
 };
 
 struct SampleOut {

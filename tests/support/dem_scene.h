@@ -60,9 +60,8 @@ class Scene {
     std::vector<double> mine;
     const ParticleStore& p = dem.particles();
     for (std::size_t i = 0; i < p.owned; ++i) {
-      const Vec3 spin = p.spin.empty() ? Vec3{} : p.spin[i];
       mine.push_back(static_cast<double>(p.id[i]));
-      for (const Vec3 v : {p.position[i], p.velocity[i], spin}) mine.insert(mine.end(), {v.x, v.y, v.z});
+      for (const Vec3 v : {p.position(i), p.velocity(i), p.spin(i)}) mine.insert(mine.end(), {v.x, v.y, v.z});
     }
     const std::vector<double> all = decomposition_.comm().gather_all(mine);
     std::map<std::int64_t, Particle> result;
@@ -84,9 +83,7 @@ class Scene {
     for (int d = 0; d < 3; ++d) result.sides[d] = {spheres.sides[d], spheres.sides[d]};
     return result;
   }
-  void take(ParticleStore store) {
-    dem.set_particles(std::move(store.position), std::move(store.velocity), std::move(store.spin), std::move(store.id));
-  }
+  void take(ParticleStore store) { dem.set_particles(std::move(store)); }
 
   Spheres spheres_;
   Decomposition decomposition_;

@@ -23,17 +23,17 @@ TEST(Seeding, RandomSpheresLieInTheRegionAndDoNotOverlap) {
   ASSERT_EQ(store.owned, 1500u);
   for (std::size_t i = 0; i < store.owned; ++i) {
     for (int d = 0; d < 3; ++d) {
-      EXPECT_GE(store.position[i][d], seeds.low[d] + radius);
-      EXPECT_LE(store.position[i][d], seeds.high[d] - radius);
+      EXPECT_GE(store.position(i)[d], seeds.low[d] + radius);
+      EXPECT_LE(store.position(i)[d], seeds.high[d] - radius);
     }
-    for (std::size_t j = 0; j < i; ++j) EXPECT_GE(norm(store.position[i] - store.position[j]), 2 * radius);
+    for (std::size_t j = 0; j < i; ++j) EXPECT_GE(norm(store.position(i) - store.position(j)), 2 * radius);
   }
 }
 
 TEST(Seeding, VelocitiesAreGaussianWithTheDeviationAsked) {
   const ParticleStore store = seed_random(decomposition(Comm::self()), radius, seeds);
   double sum = 0, squares = 0, fourths = 0;
-  for (const Vec3 v : store.velocity)
+  for (const Vec3 v : store.velocities())
     for (int d = 0; d < 3; ++d) {
       sum += v[d];
       squares += v[d] * v[d];
@@ -51,8 +51,8 @@ TEST(Seeding, TheBedDoesNotDependOnTheNumberOfRanks) {
   const ParticleStore mine = seed_random(decomposition(world), radius, seeds);
   EXPECT_EQ(world.sum(static_cast<std::int64_t>(mine.owned)), 1500);
   for (std::size_t i = 0; i < mine.owned; ++i) {
-    EXPECT_EQ(mine.position[i], whole.position[static_cast<std::size_t>(mine.id[i])]);
-    EXPECT_EQ(mine.velocity[i], whole.velocity[static_cast<std::size_t>(mine.id[i])]);
+    EXPECT_EQ(mine.position(i), whole.position(static_cast<std::size_t>(mine.id[i])));
+    EXPECT_EQ(mine.velocity(i), whole.velocity(static_cast<std::size_t>(mine.id[i])));
   }
 }
 
@@ -60,10 +60,10 @@ TEST(Seeding, TheSeedChoosesTheBedAndNothingElseDoes) {
   RandomSeeds other = seeds;
   other.seed = 43;
   const Decomposition d = decomposition(Comm::self());
-  EXPECT_NE(seed_random(d, radius, seeds).position, seed_random(d, radius, other).position);
+  EXPECT_NE(seed_random(d, radius, seeds).positions(), seed_random(d, radius, other).positions());
   RandomSeeds still = seeds;
   still.velocity_deviation = 0;
-  EXPECT_EQ(seed_random(d, radius, seeds).position, seed_random(d, radius, still).position);
+  EXPECT_EQ(seed_random(d, radius, seeds).positions(), seed_random(d, radius, still).positions());
 }
 
 TEST(Seeding, ThreeTenthsSolidFitAndHalfIsRefusedByNameAndFraction) {
@@ -85,9 +85,9 @@ TEST(Seeding, ThreeTenthsSolidFitAndHalfIsRefusedByNameAndFraction) {
 TEST(Seeding, ALatticeFillsItsRegionHalfASpacingFromTheFaces) {
   const ParticleStore store = seed_lattice(decomposition(Comm::self()), radius, {4, 3, 2}, {0, 0, 0}, {0.02, 0.03, 0.01});
   ASSERT_EQ(store.owned, 24u);
-  EXPECT_NEAR(store.position[0].x, 0.0025, 1e-17);
-  EXPECT_NEAR(store.position[23].z, 0.0075, 1e-17);
-  EXPECT_NEAR(store.position[1].x - store.position[0].x, 0.005, 1e-17);
+  EXPECT_NEAR(store.position(0).x, 0.0025, 1e-17);
+  EXPECT_NEAR(store.position(23).z, 0.0075, 1e-17);
+  EXPECT_NEAR(store.position(1).x - store.position(0).x, 0.005, 1e-17);
   EXPECT_EQ(store.id[23], 23);
   EXPECT_THROW(seed_lattice(decomposition(Comm::self()), radius, {17, 3, 2}, {0, 0, 0}, {0.02, 0.03, 0.01}), Stop);
 }
@@ -103,9 +103,9 @@ TEST(Seeding, PlacedSpheresGoToTheirOwnersAsGiven) {
   EXPECT_EQ(world.sum(static_cast<std::int64_t>(store.owned)), 9);
   for (std::size_t i = 0; i < store.owned; ++i) {
     const PlacedSphere& given = spheres[static_cast<std::size_t>(store.id[i])];
-    EXPECT_EQ(store.position[i], given.position);
-    EXPECT_EQ(store.velocity[i], given.velocity);
-    EXPECT_EQ(store.spin[i], given.spin);
+    EXPECT_EQ(store.position(i), given.position);
+    EXPECT_EQ(store.velocity(i), given.velocity);
+    EXPECT_EQ(store.spin(i), given.spin);
     EXPECT_EQ(d.owner(given.position), world.rank());
   }
 }

@@ -30,28 +30,23 @@ struct Box {
   }
   void add(Vec3 position, Vec3 velocity, Vec3 spin = {}) {
     if (decomposition.owner(position) != decomposition.comm().rank()) return;
-    particles.position.push_back(position);
-    particles.velocity.push_back(velocity);
-    particles.spin.push_back(spin);
-    particles.id.push_back(static_cast<std::int64_t>(particles.owned));
-    ++particles.owned;
+    particles.add(static_cast<std::int64_t>(particles.owned), position, velocity, spin);
   }
   void add_ghost() {  // of no account to any statistic
-    particles.position.push_back({0.2, 0.4, 0.1});
-    particles.velocity.push_back({1e6, 1e6, 1e6});
-    particles.spin.push_back({1e6, 1e6, 1e6});
-    particles.id.push_back(99);
+    particles.add(99, {0.2, 0.4, 0.1}, {1e6, 1e6, 1e6}, {1e6, 1e6, 1e6});
+    --particles.owned;
   }
   void clear() { particles = {}; }
   Observation observation() const {
-    return {.decomposition = decomposition,
-            .grid = &grid,
-            .pressure = &pressure,
-            .fraction = &fraction,
-            .particles = &particles,
-            .radius = 0.01,
-            .mass = 2,
-            .rotation = true};
+    return {
+        .decomposition = decomposition,
+        .grid = &grid,
+        .pressure = &pressure,
+        .fraction = &fraction,
+        .particles = &particles,
+        .radius = 0.01,
+        .mass = 2,
+    };
   }
 };
 

@@ -33,11 +33,8 @@ struct Bed {
       if (p < 8) place = {p % 2 == 0 ? 0 : 1.0, p / 2 % 2 == 0 ? 0 : 2.0, p / 4 == 0 ? 0 : 1.4999};  // corners of the box
       const Vec3 velocity{share(random) - 0.5, share(random) - 0.5, share(random) - 0.5};
       if (decomposition.owner(place) != decomposition.comm().rank()) continue;
-      particles.position.push_back(place);
-      particles.velocity.push_back(velocity);
-      particles.id.push_back(p);
+      particles.add(p, place, velocity, {});
     }
-    particles.owned = particles.position.size();
     particles.gas_force.resize(particles.owned);
   }
 
@@ -73,8 +70,8 @@ TEST(Transfer, WhatTheFloorHidesIsCounted) {
   Bed bed({5, 8, 4});
   ParticleStore heap;
   const Vec3 place{0.5, 1, 0.7};
-  if (bed.decomposition.owner(place) == bed.decomposition.comm().rank()) heap.position.assign(300, place);
-  heap.owned = heap.position.size();
+  if (bed.decomposition.owner(place) == bed.decomposition.comm().rank())
+    for (int p = 0; p < 300; ++p) heap.add(p, place, {}, {});
   const double hidden = bed.transfer.deposit_volume(heap, bed.gas.fraction);
   double solids = 0;
   bed.each_cell([&](int i, int j, int k) { solids += (1 - bed.gas.fraction(i, j, k)) * bed.grid.cell_volume(); });
@@ -99,7 +96,7 @@ TEST(Transfer, BoverAllFacesIsTheSumOverParticles) {
       sums[1] += share * bed.exchange.drag_momentum[d](i, j, k);
       sums[2] += share * bed.exchange.buoyancy[d](i, j, k) * bed.grid.cell_volume();
     });
-    for (std::size_t p = 0; p < bed.particles.owned; ++p) sums[3] += 0.25 * bed.particles.velocity[p][d];
+    for (std::size_t p = 0; p < bed.particles.owned; ++p) sums[3] += 0.25 * bed.particles.velocity(p)[d];
     bed.decomposition.comm().sum(sums);
     EXPECT_NEAR(sums[0] / (400 * 0.25), 1, 1e-13);
     EXPECT_NEAR(sums[1], sums[3], 1e-13 * 100);  // 400 terms of up to 0.125
@@ -131,8 +128,8 @@ TEST(Transfer, ConstantsAreReproducedNextToWallsToo) {
   bed.transfer.deposit_drag(ConstantDrag{1}, {}, bed.particles, bed.gas, bed.exchange);
   bed.transfer.sample(bed.gas, bed.particles);
   for (std::size_t p = 0; p < bed.particles.owned; ++p) {
-    EXPECT_NEAR(bed.transfer.at(bed.gas.fraction, bed.particles.position[p]), 0.4, 1e-15);
-    for (int d = 0; d < 3; ++d) EXPECT_NEAR(bed.particles.gas_force[p][d] + bed.particles.velocity[p][d], 3.0 + d, 1e-14);
+    EXPECT_NEAR(bed.transfer.at(bed.gas.fraction, bed.particles.position(p)), 0.4, 1e-15);
+    for (int d = 0; d < 3; ++d) EXPECT_NEAR(bed.particles.gas_force[p][d] + bed.particles.velocity(p)[d], 3.0 + d, 1e-14);
   }
 }
 

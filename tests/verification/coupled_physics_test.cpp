@@ -47,7 +47,9 @@ double fall_by_transfer(const DragScene& gas, double density, double gravity, do
       .radius = gas.diameter / 2, .mass = density * volume, .gravity = {0, -gravity, 0}, .skin = 0.1 * gas.diameter, .gas = true};
   setup.sides[0] = setup.sides[2] = {Side::periodic, Side::periodic};
   Dem dem(decomposition, setup, timer);
-  dem.set_particles({{1.3, 79, 2.2}}, {{}}, {}, {0});
+  ParticleStore one;
+  one.add(0, {1.3, 79, 2.2}, {}, {});
+  dem.set_particles(std::move(one));
   const PairAndWall<LinearSpringDashpot> contact{{1, 0}, {1, 0}};
   for (int s = 0; s < steps; ++s) {
     transfer.deposit_volume(dem.particles(), state.fraction);
@@ -55,7 +57,7 @@ double fall_by_transfer(const DragScene& gas, double density, double gravity, do
     transfer.sample(state, dem.particles());
     dem.advance(200, time / steps / 200, contact, PairAndWall<Frictionless>{});
   }
-  return -dem.particles().velocity[0].y;
+  return -dem.particles().velocity(0).y;
 }
 
 TEST(Fall, FollowsTheEquationOfMotionFromStokesToNewtonToFirstOrderInDt) {
@@ -93,9 +95,7 @@ TEST(FixedBed, PressureDropIsErgunsExactly) {
     ParticleStore bed;
     for (int k = 0; k < 6; ++k)
       for (int j = 0; j < 16; ++j)
-        for (int i = 0; i < 6; ++i) bed.position.push_back({(i + 0.5) * cell / 2, (j + 0.5) * cell / 2, (k + 0.5) * cell / 2});
-    bed.owned = bed.position.size();
-    bed.velocity.resize(bed.owned);
+        for (int i = 0; i < 6; ++i) bed.add(0, {(i + 0.5) * cell / 2, (j + 0.5) * cell / 2, (k + 0.5) * cell / 2}, {}, {});
     solver.prepare(gas, 0);
     transfer.deposit_volume(bed, gas.fraction);
     for (int step = 0; step < 60; ++step) {  // b follows U with a lag of a step
@@ -135,17 +135,14 @@ TEST(Displacement, AMovingCloudDrivesTheGasThatItDisplaces) {
   Exchange exchange(grid);
 
   ParticleStore cloud;
-  for (int p = 0; p < 60; ++p)
-    cloud.position.push_back({std::fmod(0.37 * p, 4), 4 + std::fmod(0.11 * p, 2), std::fmod(0.71 * p, 3)});
-  cloud.owned = cloud.position.size();
-  cloud.velocity.resize(cloud.owned);
+  for (int p = 0; p < 60; ++p) cloud.add(p, {std::fmod(0.37 * p, 4), 4 + std::fmod(0.11 * p, 2), std::fmod(0.71 * p, 3)}, {}, {});
   const double dt = 0.01, amplitude = 1.5, omega = 2;
   Field before(grid);
   transfer.deposit_volume(cloud, gas.fraction);
-  const std::vector<Vec3> home = cloud.position;
+  const std::vector<Vec3> home = cloud.positions();
   for (int step = 1; step <= 30; ++step) {
     before = gas.fraction;
-    for (std::size_t p = 0; p < cloud.owned; ++p) cloud.position[p].y = home[p].y + amplitude * std::sin(omega * step * dt);
+    for (std::size_t p = 0; p < cloud.owned; ++p) cloud.position(p).y = home[p].y + amplitude * std::sin(omega * step * dt);
     ASSERT_EQ(transfer.deposit_volume(cloud, gas.fraction), 0);  // else the floor would hide solids
     for (std::size_t c = 0; c < gas.fraction.size(); ++c) {
       gas.fraction_rate.data()[c] = (gas.fraction.data()[c] - before.data()[c]) / dt;

@@ -71,7 +71,7 @@ Found found(const Simulation& simulation, const Comm& comm) {
   const ParticleStore& store = simulation.particles()->particles();
   std::vector<double> rows;
   for (std::size_t p = 0; p < store.owned; ++p) {
-    rows.insert(rows.end(), {static_cast<double>(store.id[p]), store.position[p].x, store.position[p].y, store.position[p].z});
+    rows.insert(rows.end(), {static_cast<double>(store.id[p]), store.position(p).x, store.position(p).y, store.position(p).z});
   }
   rows = comm.gather_all(rows);
   result.position.resize(rows.size() / 4);

@@ -188,7 +188,7 @@ TEST(Failure, WhatIsNotFiniteOrJumpsOverOthersHasDiverged) {
     scene.place({{{0.004, 0.01, 0.01}, {0, 0, 0}, {}}, {{0.01, 0.01, 0.01}, {}, {}}});
     ParticleStore& p = scene.dem.particles();
     for (std::size_t i = 0; i < p.owned; ++i)
-      if (p.id[i] == 0) p.velocity[i] = {speed, 0, 0};
+      if (p.id[i] == 0) p.velocity(i) = {speed, 0, 0};
     scene.advance(100, 1e-6);
     EXPECT_EQ(scene.decomposition().comm().sum(static_cast<std::int64_t>(static_cast<bool>(scene.dem.failure()))), 1) << speed;
     if (scene.dem.failure()) {

@@ -108,9 +108,9 @@ TYPED_TEST(Restart, TheSameRanksGoOnWithTheSameBits) {
   const ParticleStore &a = whole.dem.particles(), &b = resumed.dem.particles();
   EXPECT_EQ(a.owned, b.owned);
   EXPECT_EQ(a.id, b.id);
-  EXPECT_TRUE(same_bits(a.position, b.position));
-  EXPECT_TRUE(same_bits(a.velocity, b.velocity));
-  EXPECT_TRUE(same_bits(a.spin, b.spin));
+  EXPECT_TRUE(same_bits(a.positions(), b.positions()));
+  EXPECT_TRUE(same_bits(a.velocities(), b.velocities()));
+  EXPECT_TRUE(same_bits(a.spins(), b.spins()));
   EXPECT_TRUE(same_bits(whole.dem.positions_at_rebuild(), resumed.dem.positions_at_rebuild()));
   EXPECT_GT(whole.dem.rebuilds(), 10);
 }
@@ -129,15 +129,9 @@ TYPED_TEST(Restart, OtherRanksKeepAllParticlesAndContacts) {
     return mine;
   };
   ParticleStore mine;
-  const auto owned = [&](auto rows) {
-    rows.resize(std::min(rows.size(), saved.particles.owned));
-    return share(rows);
-  };
-  mine.position = owned(saved.particles.position);
-  mine.velocity = owned(saved.particles.velocity);
-  mine.spin = owned(saved.particles.spin);
-  mine.id = owned(saved.particles.id);
-  mine.owned = mine.id.size();
+  for (std::size_t i = static_cast<std::size_t>(world.rank()); i < saved.particles.owned;
+       i += static_cast<std::size_t>(world.size()))
+    mine.add(saved.particles.id[i], saved.particles.position(i), saved.particles.velocity(i), saved.particles.spin(i));
   Scene<TypeParam> spread(world, edges, loaded());
   spread.dem.restore(redistribute(spread.decomposition(), mine), {}, share(saved.pairs), share(saved.walls));
   const auto before = spread.gathered();
@@ -186,18 +180,14 @@ TEST(Redistribute, EveryParticleComesToItsOwnerWithItsRows) {
   for (std::int64_t id = world.rank(); id < 300; id += world.size()) {
     const double x = 0.1 + 0.8 * static_cast<double>(id * 37 % 300) / 300,
                  y = 0.1 + 0.8 * static_cast<double>(id * 91 % 300) / 300;
-    mine.id.push_back(id);
-    mine.position.push_back({x, y, 0.5});
-    mine.velocity.push_back({static_cast<double>(id), 0, 0});
+    mine.add(id, {x, y, 0.5}, {static_cast<double>(id), 0, 0}, {});
     mine.gas_force.push_back({0, static_cast<double>(id), 0});
-    ++mine.owned;
   }
   const ParticleStore here = redistribute(decomposition, mine);
   EXPECT_EQ(world.sum(static_cast<std::int64_t>(here.owned)), 300);
-  EXPECT_TRUE(here.spin.empty());
   for (std::size_t i = 0; i < here.owned; ++i) {
-    EXPECT_EQ(decomposition.owner(here.position[i]), world.rank());
-    EXPECT_EQ(here.velocity[i].x, static_cast<double>(here.id[i]));
+    EXPECT_EQ(decomposition.owner(here.position(i)), world.rank());
+    EXPECT_EQ(here.velocity(i).x, static_cast<double>(here.id[i]));
     EXPECT_EQ(here.gas_force[i].y, static_cast<double>(here.id[i]));
   }
 }
