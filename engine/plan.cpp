@@ -157,6 +157,7 @@ void plan_parts(Plan& plan) {
   add("coupling", scene.coupling.has_value(),
       scene.coupling ? "gas and particles are both there" : "there is only one of the two");
   if (scene.coupling) {
+    add("drag law", true, std::visit([](const auto& law) { return std::string(law.name); }, scene.coupling->drag));
     add("displacement of gas, ∂ε/∂t", scene.coupling->displacement,
         scene.coupling->displacement
             ? "default"

@@ -163,23 +163,38 @@ ParticleScene particle_scene(const v1::Case& from) {
 
 // ---- coupling, monitors
 
+Drag drag(const v1::Coupling& from) {
+  switch (from.drag_case()) {
+    case v1::Coupling::kGidaspow:
+      return Gidaspow{};
+    case v1::Coupling::kWenYu:
+      return WenYu{};
+    case v1::Coupling::kErgun:
+      return Ergun{};
+    case v1::Coupling::kSchillerNaumann:
+      return SchillerNaumann{};
+    case v1::Coupling::kDiFelice:
+      return DiFelice{};
+    case v1::Coupling::kSyamlalObrien:
+      return SyamlalObrien{};
+    case v1::Coupling::kKochHill:
+      return KochHill{};
+    case v1::Coupling::kBeetstra:
+      return Beetstra{};
+    case v1::Coupling::kTenneti:
+      return Tenneti{};
+    case v1::Coupling::kConstantDrag:
+      return ConstantDrag{from.constant_drag().coefficient()};
+    default:
+      return GidaspowBlended{};
+  }
+}
+
 CouplingScene coupling_scene(const v1::Coupling& from) {
   CouplingScene scene;
+  scene.drag = drag(from);
   scene.displacement = from.displacement();
   scene.fraction_floor = from.gas_fraction_floor();
-  switch (from.drag_case()) {
-    case v1::Coupling::kErgun:
-      scene.drag = Ergun{};
-      break;
-    case v1::Coupling::kWenYu:
-      scene.drag = WenYu{};
-      break;
-    case v1::Coupling::kConstantDrag:
-      scene.drag = ConstantDrag{from.constant_drag().coefficient()};
-      break;
-    default:
-      scene.drag = GidaspowBlended{};
-  }
   return scene;
 }
 

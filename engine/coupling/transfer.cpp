@@ -194,8 +194,15 @@ void Transfer::deposit_drag(const Drag& drag, const DragScene& scene, const Part
 }
 
 template void Transfer::deposit_drag(const GidaspowBlended&, const DragScene&, const ParticleStore&, const GasState&, Exchange&);
-template void Transfer::deposit_drag(const Ergun&, const DragScene&, const ParticleStore&, const GasState&, Exchange&);
+template void Transfer::deposit_drag(const Gidaspow&, const DragScene&, const ParticleStore&, const GasState&, Exchange&);
 template void Transfer::deposit_drag(const WenYu&, const DragScene&, const ParticleStore&, const GasState&, Exchange&);
+template void Transfer::deposit_drag(const Ergun&, const DragScene&, const ParticleStore&, const GasState&, Exchange&);
+template void Transfer::deposit_drag(const SchillerNaumann&, const DragScene&, const ParticleStore&, const GasState&, Exchange&);
+template void Transfer::deposit_drag(const DiFelice&, const DragScene&, const ParticleStore&, const GasState&, Exchange&);
+template void Transfer::deposit_drag(const SyamlalObrien&, const DragScene&, const ParticleStore&, const GasState&, Exchange&);
+template void Transfer::deposit_drag(const KochHill&, const DragScene&, const ParticleStore&, const GasState&, Exchange&);
+template void Transfer::deposit_drag(const Beetstra&, const DragScene&, const ParticleStore&, const GasState&, Exchange&);
+template void Transfer::deposit_drag(const Tenneti&, const DragScene&, const ParticleStore&, const GasState&, Exchange&);
 template void Transfer::deposit_drag(const ConstantDrag&, const DragScene&, const ParticleStore&, const GasState&, Exchange&);
 
 double Transfer::pressure_gradient(const Field& pressure, int d, std::ptrdiff_t at) const {
