@@ -1,17 +1,28 @@
-// Planes that bound the particles: the faces of the box.
+// Planes that bound the particles: the faces of the box, and half-spaces of any direction.
 #pragma once
 
 #include <array>
+#include <limits>
 
-#include "base/vec3.h"
+#include "geometry/touch.h"
 
 namespace bedflow {
 
 struct Plane {
-  Vec3 normal;        // unit, into the box
+  Vec3 normal;        // unit, to the side of the particles
   double offset = 0;  // m, so that points of the plane have normal·x = offset
 
   double distance(Vec3 x) const { return dot(normal, x) - offset; }  // m, negative beyond the plane
+
+  void touch(Vec3 x, double reach, Touches& touches) const {
+    const double away = distance(x);
+    if (away < reach) touches.add({x - away * normal, normal, away});
+  }
+  bool passed(Vec3 x) const { return distance(x) < 0; }
+  Bounds bounds() const {
+    constexpr double far = std::numeric_limits<double>::infinity();
+    return {{-far, -far, -far}, {far, far, far}};
+  }
 };
 
 // Faces of the box from the origin to `size` (m), as 2·direction + side.
