@@ -76,6 +76,7 @@ void plan_space(Plan& plan) {
   bool shared = plan.ranks > 1;
   for (int d = 0; d < 3; ++d) shared = shared || scene.periodic[d];
   plan.ghosts = scene.coupling && shared ? 2 : 1;  // a particle may stand half a skin beyond its block
+  if (scene.gas) plan.ghosts = std::max(plan.ghosts, ghosts_of(scene.gas->setup.convection));
   for (int d = 0; d < 3; ++d)
     if (scene.particles && std::abs(scene.gravity[d]) > 0.5 * norm(scene.gravity)) plan.tall = d;
   plan.cells = scene.cells;
@@ -141,6 +142,13 @@ void plan_parts(Plan& plan) {
       scene.gas ? std::to_string(scene.cells[0]) + " x " + std::to_string(scene.cells[1]) + " x " +
                       std::to_string(scene.cells[2]) + " cells"
                 : "the case has no gas");
+  if (scene.gas) {
+    const auto& scheme = scene.gas->setup.convection;
+    const bool second = !std::holds_alternative<Upwind>(scheme);
+    add("convection of second order", second,
+        std::string("gas.") + std::visit([](const auto& law) { return law.name; }, scheme) +
+            (second ? ": two layers of ghosts" : ": first order"));
+  }
   add("particles and contacts", scene.particles.has_value(),
       scene.particles ? std::to_string(plan.particle_count) + " of d = " + number(scene.particles->diameter) + " m"
                       : "the case has no particles");

@@ -44,6 +44,17 @@ SixFaces six_faces(const v1::Faces& f) {
   return {{{&f.x_low(), &f.x_high()}, {&f.y_low(), &f.y_high()}, {&f.z_low(), &f.z_high()}}};
 }
 
+Convection convection(const v1::Gas& from) {
+  switch (from.convection_case()) {
+    case v1::Gas::kSmart:
+      return Smart{};
+    case v1::Gas::kSuperbee:
+      return Superbee{};
+    default:
+      return Upwind{};
+  }
+}
+
 GasScene gas_scene(const v1::Case& from) {
   const v1::Gas& gas = from.gas();
   const v1::Simple& simple = gas.simple();
@@ -53,6 +64,7 @@ GasScene gas_scene(const v1::Case& from) {
                  .viscosity = gas.viscosity(),
                  .gravity = vec(from.gravity()),
                  .faces = {},
+                 .convection = convection(gas),
                  .pressure_relaxation = simple.pressure_relaxation(),
                  .velocity_relaxation = simple.velocity_relaxation(),
                  .min_iterations = static_cast<int>(simple.min_iterations()),

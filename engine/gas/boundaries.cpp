@@ -88,14 +88,28 @@ void Boundaries::set_velocity_beyond(FaceField& velocity) const {
       const Boundary* boundary = at(d, side);
       if (!boundary) continue;
       for (int c = 0; c < 3; ++c) {
-        if (c == d && side == 1) continue;  // that place is the face itself
         double* u = velocity[c].data();
+        if (c == d) {
+          continue_normal(d, side, u);
+          continue;
+        }
         // Mean over the face: the wall's velocity, or 0 on inflows; no gradient otherwise.
-        const bool fixed = c != d && (std::holds_alternative<NoSlip>(*boundary) || std::holds_alternative<Inflow>(*boundary));
+        const bool fixed = std::holds_alternative<NoSlip>(*boundary) || std::holds_alternative<Inflow>(*boundary);
         const double on_face = fixed && std::holds_alternative<NoSlip>(*boundary) ? std::get<NoSlip>(*boundary).velocity[c] : 0;
         for_layer(d, side, true, [=](auto in, auto beyond) { u[beyond] = fixed ? 2 * on_face - u[in] : u[in]; });
       }
     }
+}
+
+// One face beyond that of the box.
+void Boundaries::continue_normal(int d, int side, double* u) const {
+  if (side == 1 && grid_.ghosts < 2) return;  // the ghost is the face itself
+  const std::ptrdiff_t out = side == 0 ? -grid_.stride(d) : grid_.stride(d);
+  const bool line = !outflow(d, side);
+  for_layer(d, side, true, [=](auto in, auto beyond) {
+    const std::ptrdiff_t face = side == 0 ? in : beyond;
+    u[face + out] = line ? 2 * u[face] - u[face - out] : u[face];
+  });
 }
 
 void Boundaries::set_pressure(Field& pressure, bool on_face) const {

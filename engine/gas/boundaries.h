@@ -1,7 +1,8 @@
 // The conditions on the faces of the box (models/boundary.h) as values on boundary faces and in the ghosts beyond them.
 //
-// Normal velocity on the face: 0 on walls, the superficial velocity over ε on inflows, solved for on outflows. Beyond the face
-// tangential velocity, ε and p continue so that their mean, or difference, over the face is what the condition says.
+// Normal velocity on the face: 0 on walls, the superficial velocity over ε on inflows, solved for on outflows; beyond the face it
+// goes on as a line, or without gradient after an outflow. Tangential velocity, ε and p continue beyond it so that their mean, or
+// difference, over the face is what the condition says.
 #pragma once
 
 #include <array>
@@ -30,7 +31,7 @@ class Boundaries {
   void continue_field(Field& field) const;
   // Normal velocity on walls and inflows at a time (s).
   void set_normal_velocity(FaceField& velocity, const Field& fraction, double time) const;
-  // Tangential velocity beyond the faces, and normal velocity beyond low ones.
+  // Tangential velocity beyond the faces, and normal velocity beyond the face itself as far as the grid has ghosts.
   void set_velocity_beyond(FaceField& velocity) const;
   // p beyond outflows is the pressure ON the face (on_face), or what gives the gradient at the face by the difference of centres;
   // beyond others it is as in the cell before them.
@@ -41,6 +42,7 @@ class Boundaries {
   template <class Act>
   void for_layer(int d, int side, bool wide, Act act) const;
   void cover_patches(int d, int side);
+  void continue_normal(int d, int side, double* u) const;
 
   const Decomposition& decomposition_;
   const Grid& grid_;

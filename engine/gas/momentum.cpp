@@ -30,6 +30,7 @@ Momentum::Momentum(const Decomposition& decomposition, const Grid& grid, Halo& h
       coupling_(static_cast<std::size_t>(grid.cells[0]) + 1),
       row_(static_cast<std::size_t>(grid.cells[0]) + 1),
       carry_(static_cast<std::size_t>(grid.cells[0]) + 1) {
+  if (ghosts_of(setup.convection) > 1) correction_ = Field(grid);
   for (Equations& e : equations_) {
     for (Field& a : e.neighbour) a = Field(grid);
     e.diagonal = Field(grid);
@@ -147,6 +148,7 @@ Momentum::Sums Momentum::assemble(const GasState& state) {
     for (int t = 0; t < 3; ++t)
       for (int side = 0; side < 2; ++side)
         if (t != d && boundaries_.at(t, side)) apply_boundary(d, t, side);
+    correct_convection(d, state.velocity[d].data());
     relax(d, state.velocity[d].data(), sums);
   }
   sums.coupling = *std::max_element(coupling_.begin(), coupling_.end());

@@ -1,7 +1,7 @@
 // The linearised momentum equation of each velocity component on its own staggered control volumes.
 //
 // Continuity times U is subtracted, which leaves, over the control volume V of a face with upwind convection (Patankar 1980,
-// ch. 5 and 6),
+// ch. 5 and 6; other schemes add a correction, momentum_convection.cpp),
 //
 //   [ρg ε° V/Δt + Σ a + Σb] u = Σ a_nb u_nb + ρg ε° V/Δt u° + ε_b A (p_low − p_high) + Σ b V_d + ε_b ρg g V
 //                               + (μ/3) A (∇·U_high − ∇·U_low),        a = μ A/h + max(−F, 0),
@@ -37,7 +37,8 @@ class Momentum {
     double throughput = 0;  // volume flow through a mean cross-section of each direction, m³/s
     double coupling = 0;    // the largest Σa over the relaxed diagonal (below 1): how strongly faces hang together; a maximum
   };
-  // The equations about the present velocity and pressure (outflow ghosts: pressure on the face), and their residual there.
+  // The equations about the present velocity and pressure (outflow ghosts: pressure on the face), and their residual there. All
+  // ghosts are right, beyond the faces of the box too.
   Sums assemble(const GasState& state);
   // Gauss–Seidel sweeps, there and back, of the relaxed equations of each component: as many as the coupling (the largest of all
   // ranks) asks for.
@@ -60,6 +61,9 @@ class Momentum {
   void assemble_inside(int d, const double* p);
   void assemble_outflow(int d, int side, const double* p);
   void apply_boundary(int d, int t, int side);
+  void correct_convection(int d, const double* u);
+  template <class Scheme>
+  void correct_along(const Scheme& scheme, int d, int t, const double* u);
   void relax(int d, const double* u, Sums& sums);
   void sweep(int d, int direction, double* u);
   std::ptrdiff_t step_above(std::ptrdiff_t row, int n) const;
@@ -77,6 +81,7 @@ class Momentum {
   FaceField local_, constant_, push_;  // ρg ε° V/Δt + Σb; that and the forces which do not change; ε_b A
   FaceField flux_;                     // ρg ε u A
   Field divergence_;                   // ∇·U
+  Field correction_;                   // |F| (u_face − u_upstream) through a side; with schemes beyond upwind
   std::array<Equations, 3> equations_;
   FaceField mobility_;
   std::array<RowSum, 3> row_sums_;

@@ -5,11 +5,13 @@
 
 namespace bedflow {
 
-// The half control volume before an outflow. Beyond it there is no gradient; what comes back starts from rest.
+// The half control volume before an outflow. On the face nothing but p acts along the normal, and nothing across; what comes back
+// starts from rest.
 void Momentum::assemble_outflow(int d, int side, const double* p) {
   const std::ptrdiff_t s = grid_.stride(d);
   const double mu = setup_.viscosity, volume = grid_.cell_volume();
   const double along = mu * volume / (grid_.spacing[d] * grid_.spacing[d]);
+  const double dilatation = (side == 0 ? mu : -mu) * grid_.face_area(d) / 3;
   const double* f = flux_[d].data();
   Equations& e = equations_[d];
   Int3 from{0, 0, 0}, to = grid_.cells;
@@ -29,7 +31,8 @@ void Momentum::assemble_outflow(int d, int side, const double* p) {
         e.neighbour[2 * t + 1].data()[c] = across + std::max(-0.5 * ft[cell + grid_.stride(t)], 0.0);
       }
       e.diagonal.data()[c] = local_[d].data()[c] + std::max(side == 0 ? f[c] : -f[c], 0.0);
-      e.source.data()[c] = constant_[d].data()[c] + push_[d].data()[c] * (p[c - s] - p[c]);
+      e.source.data()[c] =
+          constant_[d].data()[c] + push_[d].data()[c] * (p[c - s] - p[c]) + dilatation * divergence_.data()[cell];
     }
   });
 }

@@ -169,6 +169,7 @@ GasOutcome Simple::Work::iterate(GasState& state, const Exchange* exchange, doub
     outcome.pressure_iterations += result.iterations;
     continuity = result.imbalance;
     pressure.correct(state.velocity, state.pressure, momentum.mobility(), setup.pressure_relaxation);
+    boundaries.set_velocity_beyond(state.velocity);
     halo.fill(state.velocity);
     halo.fill(state.pressure);
   }
@@ -199,8 +200,6 @@ GasOutcome Simple::advance(GasState& state, const Exchange* exchange, double tim
     w.balance = old_balance;
     return outcome;
   }
-  w.boundaries.set_velocity_beyond(state.velocity);
-  w.halo.fill(state.velocity);
   w.boundaries.set_pressure(state.pressure, false);
   w.halo.fill(state.pressure);
   w.measure(state);

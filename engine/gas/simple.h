@@ -3,7 +3,7 @@
 //   ∂ε/∂t + ∇·(ε U) = 0
 //   ρg ε DU/Dt = −ε_b ∇p + ∇·σ + Σ b (V − U)/cell + ρg ε_b g,     σ = μ(∇U + ∇Uᵀ) − (2/3) μ (∇·U) I
 //
-// backward Euler, first-order upwind. ε_b is the gas share of a face's cell as the particles' buoyancy leaves it (Exchange).
+// backward Euler. ε_b is the gas share of a face's cell as the particles' buoyancy leaves it (Exchange).
 #pragma once
 
 #include <array>
@@ -14,6 +14,7 @@
 #include "grid/grid.h"
 #include "grid/halo.h"
 #include "models/boundary.h"
+#include "models/convection.h"
 
 namespace bedflow {
 
@@ -22,6 +23,7 @@ struct GasSetup {
   double viscosity = 0;                            // μ, Pa·s
   Vec3 gravity;                                    // m/s²
   std::array<std::array<Boundary, 2>, 3> faces{};  // [direction][low, high]; ignored where periodic
+  Convection convection{};                         // the grid needs ghosts_of(convection) layers
   double pressure_relaxation = 0.8;
   double velocity_relaxation = 0.5;
   int min_iterations = 2;

@@ -38,6 +38,7 @@ TEST(Laws, OfTheSchemaAreThoseOfTheCode) {
   EXPECT_EQ(arms(v1::Coupling::descriptor(), "drag"), NamesOf<Drag>::get());
   EXPECT_EQ(arms(v1::Particles::descriptor(), "contact"), NamesOf<ContactLaw>::get());
   EXPECT_EQ(arms(v1::Particles::descriptor(), "tangential"), NamesOf<TangentialLaw>::get());
+  EXPECT_EQ(arms(v1::Gas::descriptor(), "convection"), NamesOf<Convection>::get());
   EXPECT_EQ(arms(v1::Face::descriptor(), "condition"), NamesOf<Boundary>::get());
   EXPECT_EQ(arms(v1::Monitor::descriptor(), "quantity"), NamesOf<Statistic>::get());
   EXPECT_EQ(arms(v1::Coupling::descriptor(), "kernel"), std::set<std::string>{Hat::name});

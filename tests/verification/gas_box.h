@@ -14,7 +14,7 @@ struct GasBox {
   GasBox(Int3 cells, Vec3 size, std::array<bool, 3> periodic, const GasSetup& setup, const Comm& comm = Comm::self(),
          int tall = -1)
       : decomposition(comm, cells, size, periodic, tall),
-        grid(decomposition),
+        grid(decomposition, ghosts_of(setup.convection)),
         halo(decomposition, grid, timer),
         simple(decomposition, grid, halo, setup, timer),
         state(grid),

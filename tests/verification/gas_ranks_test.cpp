@@ -83,13 +83,18 @@ TEST(GasRanks, BedBetweenInflowPatchAndOutflowIsTheSameOnAnyNumber) {
     expect_same_on_all_ranks(scene);
     std::swap(scene.setup.faces[up][0], scene.setup.faces[up][1]);
     expect_same_on_all_ranks(scene);
+    scene.setup.convection = Smart{};
+    expect_same_on_all_ranks(scene);
   }
 }
 
 TEST(GasRanks, PeriodicBoxIsTheSameOnAnyNumber) {
   Scene scene{{8, 6, 10}, {0.04, 0.03, 0.05}, {true, true, true}, still_air()};
   scene.setup.gravity = {1, -9.81, 2};
-  expect_same_on_all_ranks(scene);
+  for (const Convection& scheme : {Convection(Upwind{}), Convection(Smart{}), Convection(Superbee{})}) {
+    scene.setup.convection = scheme;
+    expect_same_on_all_ranks(scene);
+  }
 }
 
 TEST(GasRanks, ClosedBoxIsTheSameOnAnyNumber) {
