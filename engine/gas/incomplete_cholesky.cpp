@@ -17,7 +17,6 @@ IncompleteCholesky::IncompleteCholesky(const Grid& grid)
 // e_c = A_cc − Σ_t c_t² E_t − modification · Σ_t c_t E_t (the other couplings upward of cell t), t: the cell before c in x, y, z.
 void IncompleteCholesky::factor(const SevenPoint& matrix) {
   const double *x = matrix.coupling[0].data(), *y = matrix.coupling[1].data(), *z = matrix.coupling[2].data();
-  const double* diagonal = matrix.diagonal.data();
   double* pivot = pivot_.data();
   const std::ptrdiff_t sy = grid_.stride(1), sz = grid_.stride(2);
   const int nx = grid_.cells[0], ny = grid_.cells[1], nz = grid_.cells[2];
@@ -27,13 +26,14 @@ void IncompleteCholesky::factor(const SevenPoint& matrix) {
       std::ptrdiff_t c = grid_.index(0, j, k);
       for (int i = 0; i < nx; ++i, ++c) {
         const double up_x = i + 1 < nx ? 1 : 0;
+        const double diagonal = x[c] + x[c + 1] + y[c] + y[c + sy] + z[c] + z[c + sz];
         const double west = x[c] * pivot[c - 1], south = y[c] * pivot[c - sy], below = z[c] * pivot[c - sz];
-        const double kept = diagonal[c] - west * x[c] - south * y[c] - below * z[c];
+        const double kept = diagonal - west * x[c] - south * y[c] - below * z[c];
         const double dropped = west * (up_y * y[c - 1 + sy] + up_z * z[c - 1 + sz]) +
                                south * (up_x * x[c - sy + 1] + up_z * z[c - sy + sz]) +
                                below * (up_x * x[c - sz + 1] + up_y * y[c - sz + sy]);
         double e = kept - modification * dropped;
-        if (!(e > smallest_pivot * diagonal[c])) e = diagonal[c];
+        if (!(e > smallest_pivot * diagonal)) e = diagonal;
         pivot[c] = e > 0 ? 1 / e : 0;  // 0: a cell that touches no other
       }
     }

@@ -1,21 +1,20 @@
-// The pressure correction of SIMPLE: p' such that the velocities u' = D (p'_low − p'_high), added, leave no cell out of balance,
+// The pressure equation of both solvers: p' such that the velocities u' = D (p'_low − p'_high), added, leave no cell out of
+// balance,
 //
 //   Σ_faces ε A D (p'_c − p'_beyond) = −(Σ_faces ε u A outward + V ∂ε/∂t),        D: mobility of a face (Momentum).
 //
-// Symmetric, and solved by conjugate gradients preconditioned by MIC(0). Without an outflow p' is free by a constant: the right
-// side is made to sum to 0, and p' to have no mean.
+// p' is 0 beyond an outflow. Without one it is free by a constant.
 #pragma once
 
 #include "gas/boundaries.h"
-#include "gas/incomplete_cholesky.h"
-#include "grid/halo.h"
-#include "grid/rows.h"
+#include "gas/conjugate_gradients.h"
 
 namespace bedflow {
 
 class PressureCorrection {
  public:
-  PressureCorrection(const Decomposition& decomposition, const Grid& grid, Halo& halo, const Boundaries& boundaries);
+  PressureCorrection(const Decomposition& decomposition, const Grid& grid, Halo& halo, const Boundaries& boundaries,
+                     Preconditioner preconditioner);
 
   void assemble(const FaceField& fraction, const FaceField& mobility);
   // The right side for a velocity with its ghosts.
@@ -33,18 +32,14 @@ class PressureCorrection {
   const SevenPoint& matrix() const { return matrix_; }
 
  private:
-  double dot(const Field& a, const Field& b);
-  double multiply();  // product_ = A direction_; returns direction · product, this rank
-  void subtract_mean(Field& field);
-
   const Decomposition& decomposition_;
   const Grid& grid_;
   Halo& halo_;
   const Boundaries& boundaries_;
   bool open_;  // p is given somewhere
   SevenPoint matrix_;
-  IncompleteCholesky preconditioner_;
-  Field correction_, residual_, preconditioned_, direction_, product_;
+  ConjugateGradients solver_;
+  Field correction_, residual_;
   RowSum row_sum_;
 };
 

@@ -1,5 +1,6 @@
 // A symmetric operator on cells that couples each with the six beside it:
-//   (A x)_c = diagonal_c x_c − Σ coupling_f x_(cell beyond f)        over the faces f of the cell.
+//   (A x)_c = Σ coupling_f (x_c − x_(cell beyond f))        over the faces f of the cell.
+// Beyond the faces of the box x is 0: a face with a coupling there holds x to it.
 #pragma once
 
 #include "grid/grid.h"
@@ -7,10 +8,9 @@
 namespace bedflow {
 
 struct SevenPoint {
-  FaceField coupling;  // ≥ 0; by face (index: the cell's lower face), also that after the last cell; 0 on faces of the box
-  Field diagonal;      // Σ coupling over the cell's faces, and more beside a face where x is given
+  FaceField coupling;  // ≥ 0; by face (index: the cell's lower face), also that after the last cell
 
-  explicit SevenPoint(const Grid& grid) : coupling(grid), diagonal(grid) {}
+  explicit SevenPoint(const Grid& grid) : coupling(grid) {}
 };
 
 }  // namespace bedflow

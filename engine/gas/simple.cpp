@@ -32,7 +32,7 @@ struct Simple::Work {
         timer(given_timer),
         boundaries(decomposition, grid, setup.faces),
         momentum(decomposition, grid, halo, setup, boundaries),
-        pressure(decomposition, grid, halo, boundaries),
+        pressure(decomposition, grid, halo, boundaries, setup.preconditioner),
         old_velocity(grid),
         old_pressure(grid) {}
 

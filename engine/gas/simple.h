@@ -11,6 +11,7 @@
 #include <string>
 
 #include "base/phase_timer.h"
+#include "gas/conjugate_gradients.h"
 #include "grid/grid.h"
 #include "grid/halo.h"
 #include "models/boundary.h"
@@ -28,8 +29,9 @@ struct GasSetup {
   double velocity_relaxation = 0.5;
   int min_iterations = 2;
   int max_iterations = 500;
-  double tolerance = 1e-3;           // of the normalised residuals
-  double pressure_tolerance = 1e-2;  // reduction in each linear solve of the pressure correction
+  double tolerance = 1e-3;                                    // of the normalised residuals
+  double pressure_tolerance = 1e-2;                           // reduction in each linear solve of the pressure correction
+  Preconditioner preconditioner = Preconditioner::incomplete_cholesky;  // of those solves
 };
 
 struct GasState {

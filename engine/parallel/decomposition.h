@@ -23,6 +23,7 @@ class Decomposition {
   Int3 global_cells() const { return global_cells_; }
   Int3 first() const { return first_; }  // this block's first cell
   Int3 cells() const { return cells_; }  // this block's cells
+  int cells(int d, int place) const { return first_cell(d, place + 1) - first_cell(d, place); }  // of the blocks at that place
   Vec3 size() const { return size_; }    // of the whole box, m
   Vec3 low() const { return low_; }      // this block's corners, m
   Vec3 high() const { return high_; }

@@ -1,0 +1,43 @@
+// Conjugate gradients for the 7-point operator, with a choice of preconditioners.
+//
+// Where x is given nowhere it is free by a constant: the right side is made to sum to 0, and x to have no mean.
+#pragma once
+
+#include <variant>
+
+#include "gas/incomplete_cholesky.h"
+#include "gas/multigrid.h"
+#include "grid/halo.h"
+#include "grid/rows.h"
+
+namespace bedflow {
+
+enum class Preconditioner { multigrid, incomplete_cholesky, none };
+
+class ConjugateGradients {
+ public:
+  ConjugateGradients(const Decomposition& decomposition, const Grid& grid, Halo& halo, Preconditioner preconditioner);
+
+  // What the preconditioner needs of a new matrix. Collective.
+  void factor(const SevenPoint& matrix);
+  // A x = b from x = 0 until Σ(b − A x)² over all ranks has come down to `target` or to the square of `reduction` times what it
+  // was; b becomes the residual b − A x. x has no ghosts. Returns the number of iterations. Collective.
+  int solve(const SevenPoint& matrix, bool singular, Field& b, Field& x, double reduction, double target);
+
+ private:
+  struct Identity {};
+  double dot(const Field& a, const Field& b);
+  double multiply(const SevenPoint& matrix);  // product_ = A direction_; returns direction · product, this rank
+  void precondition(const SevenPoint& matrix, const Field& r, double magnitude);
+  void subtract_mean(Field& field);
+  double cells() const { return static_cast<double>(grid_.global[0]) * grid_.global[1] * grid_.global[2]; }
+
+  const Decomposition& decomposition_;
+  const Grid& grid_;
+  Halo& halo_;
+  std::variant<Multigrid, IncompleteCholesky, Identity> preconditioner_;
+  Field preconditioned_, direction_, product_;
+  RowSum row_sum_;
+};
+
+}  // namespace bedflow

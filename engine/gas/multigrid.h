@@ -1,0 +1,85 @@
+// A multigrid V-cycle as a symmetric preconditioner, M, of the 7-point operator on cells.
+//
+// Cells are joined by twos in the directions in which they are narrow, in all once they are cubes, and within the ranks' blocks
+// as long as there is much to do; the few thousand cells that are left are gathered on every rank and solved there alike.
+//
+//   residual of a coarse cell: the sum over its cells         correction of a cell: that of its coarse cell
+//   coupling of a coarse face: the sum over its faces × distance of the fine centres / distance of the coarse ones
+//
+// which is Galerkin's operator of constant interpolation, with the over-correction of smooth errors taken out (Braess 1995): it
+// couples six cells again, and whatever the coefficients jump by, no error is corrected by more than the distances' ratio.
+// Smoothing is Gauss–Seidel in red and black, over-relaxed (Yavneh 1996), in reverse order after the coarse correction, and more
+// of it on coarser levels, which cost little. M is symmetric and positive (semi)definite, on any number of ranks. In single
+// precision: M need not be exact, and half the bytes are half the time.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "gas/seven_point.h"
+
+namespace bedflow {
+
+class Multigrid {
+ public:
+  Multigrid(const Decomposition& decomposition, const Grid& grid);
+
+  // The coefficients of all levels. Collective.
+  void factor(const SevenPoint& matrix);
+  // z = M⁻¹ r; r is of about this magnitude, by which it is divided for single precision. Collective.
+  void apply(const Field& r, double magnitude, Field& z);
+
+  std::size_t levels() const { return levels_.size(); }
+  std::size_t bytes() const;
+
+ private:
+  using Edges = std::vector<std::vector<float>>;  // along a direction: of the cells of each block, in edges of the finest cells
+  struct Level {
+    Int3 cells{}, global{};  // of this rank and of the box; the same once gathered
+    Int3 joined{1, 1, 1};    // cells of this level in one of the next
+    int half_sweeps = 0;     // of the smoothing before the coarse correction, and as many after it
+    Int3 place{};            // of this rank's block
+    int parity = 0;          // of its first cell
+    std::array<Edges, 3> edges;
+    std::array<std::array<int, 2>, 3> neighbour{};  // the rank beyond; -1: nobody
+    // A layer of ghosts around the cells, x fastest.
+    std::array<std::vector<float>, 3> coupling;  // by the cell's lower face
+    std::vector<float> inverse;                  // relaxation over the diagonal; 0: a cell that touches no other
+    std::vector<float> x, b;                     // correction and right side
+
+    std::ptrdiff_t stride(int d) const {
+      return d == 0 ? 1 : d == 1 ? cells[0] + 2 : static_cast<std::ptrdiff_t>(cells[0] + 2) * (cells[1] + 2);
+    }
+    std::ptrdiff_t index(int i, int j, int k) const { return (i + 1) + stride(1) * (j + 1) + stride(2) * (k + 1); }
+    Int3 first() const;              // index of the block's first cell in the box
+    float edge(int d, int i) const;  // of a cell or a ghost; 0 beyond the box
+    Int3 end(Int3 low) const;        // of the cells that are joined with cell `low` in one of the next level
+  };
+
+  void add_level(const std::array<Edges, 3>& edges, Int3 place, bool whole);
+  bool choose_joined(Level& level) const;
+  void coarsen(const Level& fine, Level& coarse) const;
+  void invert(Level& level) const;
+  void gather_couplings(const Level& from, Level& to);
+  void set_order();
+
+  void cycle(std::size_t l);
+  void gather(const Level& part, Level& whole);
+  static void take_part(const Level& whole, Level& part);
+  void fill_ghosts(Level& level);
+  static void start(Level& level);
+  void relax(Level& level, int colour);
+  void restrict_residual(Level& fine, Level& coarse);
+  void prolong(const Level& coarse, Level& fine);
+
+  const Decomposition& decomposition_;
+  const Grid& grid_;
+  std::vector<Level> levels_;
+  std::size_t gathered_ = 0;           // the first level that is gathered; 0: none is
+  double scale_ = 1;                   // of the couplings in single precision
+  std::vector<std::ptrdiff_t> order_;  // cells of the gathered level as the ranks send them
+  std::vector<float> row_;
+  std::vector<double> send_, receive_;
+};
+
+}  // namespace bedflow

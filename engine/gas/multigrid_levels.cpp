@@ -1,0 +1,238 @@
+// The levels of the multigrid: which cells are joined, and the coefficients of what comes of it.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "gas/multigrid.h"
+
+namespace bedflow {
+
+namespace {
+
+constexpr std::int64_t most_gathered =
+    4096;                          // cells: to solve them on every rank costs no more than the messages otherwise would
+constexpr double longest = 1.5;    // edge over the narrowest one at which cells are still joined in its direction
+constexpr double half_sweeps = 3;  // on the finest level
+constexpr double growth = 0.5;     // half sweeps grow with this power of the ratio of cells, and
+constexpr double most_half_sweeps = 16;
+constexpr double relaxation = 1.15;  // Yavneh 1996: about the best in three dimensions
+
+std::vector<float> joined_by_twos(const std::vector<float>& edges) {
+  std::vector<float> result;
+  for (std::size_t i = 0; i < edges.size(); i += 2) result.push_back(edges[i] + (i + 1 < edges.size() ? edges[i + 1] : 0));
+  return result;
+}
+
+std::vector<float> chained(const std::vector<std::vector<float>>& blocks) {
+  std::vector<float> result;
+  for (const auto& block : blocks) result.insert(result.end(), block.begin(), block.end());
+  return result;
+}
+
+}  // namespace
+
+Int3 Multigrid::Level::first() const {
+  Int3 result{};
+  for (int d = 0; d < 3; ++d)
+    for (int p = 0; p < place[d]; ++p) result[d] += static_cast<int>(edges[d][p].size());
+  return result;
+}
+
+float Multigrid::Level::edge(int d, int i) const {
+  const int blocks = static_cast<int>(edges[d].size());
+  if (i >= 0 && i < cells[d]) return edges[d][place[d]][i];
+  const int side = i < 0 ? 0 : 1;
+  if (neighbour[d][side] < 0) return 0;
+  const auto& beside = edges[d][(place[d] + (side == 0 ? blocks - 1 : 1)) % blocks];
+  return side == 0 ? beside.back() : beside.front();
+}
+
+Int3 Multigrid::Level::end(Int3 low) const {
+  Int3 result;
+  for (int d = 0; d < 3; ++d) result[d] = std::min(low[d] + joined[d], cells[d]);
+  return result;
+}
+
+Multigrid::Multigrid(const Decomposition& decomposition, const Grid& grid) : decomposition_(decomposition), grid_(grid) {
+  std::array<Edges, 3> edges;
+  for (int d = 0; d < 3; ++d)
+    for (int p = 0; p < decomposition.ranks()[d]; ++p)
+      edges[d].emplace_back(static_cast<std::size_t>(decomposition.cells(d, p)), 1.0f);
+  Int3 place = decomposition.place();
+  bool whole = decomposition.comm().size() == 1;
+  for (;;) {
+    add_level(edges, place, whole);
+    Level& level = levels_.back();
+    const std::int64_t cells = static_cast<std::int64_t>(level.global[0]) * level.global[1] * level.global[2];
+    if (cells == 1) break;
+    const bool stuck = !choose_joined(level);
+    if (!whole && (stuck || cells <= most_gathered)) {
+      for (Edges& e : edges) e = {chained(e)};
+      level.joined = {1, 1, 1};
+      place = {0, 0, 0};
+      whole = true;
+      gathered_ = levels_.size();
+      continue;
+    }
+    for (int d = 0; d < 3; ++d)
+      if (level.joined[d] == 2)
+        for (auto& block : edges[d]) block = joined_by_twos(block);
+  }
+  if (gathered_ > 0) set_order();
+  row_.resize(static_cast<std::size_t>(levels_[0].global[0]) + 2);
+}
+
+void Multigrid::add_level(const std::array<Edges, 3>& edges, Int3 place, bool whole) {
+  Level& level = levels_.emplace_back();
+  level.edges = edges;
+  level.place = place;
+  std::size_t size = 1;
+  double finer = 1;  // finest cells in one of these
+  for (int d = 0; d < 3; ++d) {
+    level.cells[d] = static_cast<int>(edges[d][place[d]].size());
+    level.global[d] = static_cast<int>(chained(edges[d]).size());
+    for (int side = 0; side < 2; ++side) {
+      level.neighbour[d][side] = !whole                       ? decomposition_.neighbour(d, side)
+                                 : decomposition_.periodic(d) ? decomposition_.comm().rank()
+                                                              : -1;
+    }
+    size *= static_cast<std::size_t>(level.cells[d]) + 2;
+    finer *= static_cast<double>(grid_.global[d]) / level.global[d];
+  }
+  const Int3 first = level.first();
+  level.parity = (first[0] + first[1] + first[2]) & 1;
+  level.half_sweeps = static_cast<int>(std::lround(half_sweeps * std::min(most_half_sweeps, std::pow(finer, growth))));
+  for (auto* field : {&level.coupling[0], &level.coupling[1], &level.coupling[2], &level.inverse, &level.x, &level.b})
+    field->assign(size, 0);
+}
+
+// False: a block is down to one cell in a direction in which cells should be joined.
+bool Multigrid::choose_joined(Level& level) const {
+  double narrowest = std::numeric_limits<double>::infinity();
+  Vec3 edge;
+  for (int d = 0; d < 3; ++d) {
+    edge[d] = decomposition_.size()[d] / level.global[d];
+    if (level.global[d] > 1) narrowest = std::min(narrowest, edge[d]);
+  }
+  bool possible = true;
+  for (int d = 0; d < 3; ++d) {
+    if (level.global[d] == 1 || edge[d] >= longest * narrowest) continue;
+    level.joined[d] = 2;
+    for (const auto& block : level.edges[d]) possible = possible && (block.size() > 1 || level.edges[d].size() == 1);
+  }
+  return possible;
+}
+
+std::size_t Multigrid::bytes() const {
+  std::size_t sum = 0;
+  for (const Level& level : levels_) sum += 6 * sizeof(float) * level.x.size();
+  return sum;
+}
+
+void Multigrid::factor(const SevenPoint& matrix) {
+  Level& finest = levels_[0];
+  double largest = 0;
+  for (const Field& coupling : matrix.coupling.component)
+    for (std::size_t i = 0; i < coupling.size(); ++i) largest = std::max(largest, coupling.data()[i]);
+  largest = decomposition_.comm().max(largest);
+  scale_ = largest > 0 ? 1 / largest : 1;
+  for (int d = 0; d < 3; ++d) {
+    const double scale = finest.global[d] == 1 && decomposition_.periodic(d) ? 0 : scale_;  // a cell beside itself
+    Int3 high = grid_.cells;
+    ++high[d];
+    for (int k = 0; k < high[2]; ++k)
+      for (int j = 0; j < high[1]; ++j) {
+        const double* from = matrix.coupling[d].data() + grid_.index(0, j, k);
+        float* to = finest.coupling[d].data() + finest.index(0, j, k);
+        for (int i = 0; i < high[0]; ++i) to[i] = static_cast<float>(scale * from[i]);
+      }
+  }
+  invert(finest);
+  for (std::size_t l = 1; l < levels_.size(); ++l) {
+    if (l == gathered_)
+      gather_couplings(levels_[l - 1], levels_[l]);
+    else
+      coarsen(levels_[l - 1], levels_[l]);
+    invert(levels_[l]);
+  }
+}
+
+void Multigrid::coarsen(const Level& fine, Level& coarse) const {
+  for (int d = 0; d < 3; ++d) {
+    if (coarse.global[d] == 1 && decomposition_.periodic(d)) continue;  // a cell beside itself
+    const int t1 = (d + 1) % 3, t2 = (d + 2) % 3;
+    Int3 high = coarse.cells, at{};
+    ++high[d];
+    for (at[2] = 0; at[2] < high[2]; ++at[2])
+      for (at[1] = 0; at[1] < high[1]; ++at[1])
+        for (at[0] = 0; at[0] < high[0]; ++at[0]) {
+          Int3 low;
+          for (int t = 0; t < 3; ++t) low[t] = std::min(fine.joined[t] * at[t], fine.cells[t]);
+          const Int3 end = fine.end(low);
+          float sum = 0;
+          Int3 from = low;
+          for (from[t2] = low[t2]; from[t2] < end[t2]; ++from[t2])
+            for (from[t1] = low[t1]; from[t1] < end[t1]; ++from[t1])
+              sum += fine.coupling[d][fine.index(from[0], from[1], from[2])];
+          const float near = fine.edge(d, low[d] - 1) + fine.edge(d, low[d]);
+          const float far = coarse.edge(d, at[d] - 1) + coarse.edge(d, at[d]);
+          coarse.coupling[d][coarse.index(at[0], at[1], at[2])] = sum * near / far;
+        }
+  }
+}
+
+// Where an odd number of cells closes on itself, two of one colour meet: what they hold each other by counts twice, so that the
+// half sweep, which does not see that both move, cannot overshoot.
+void Multigrid::invert(Level& level) const {
+  const Int3 first = level.first();
+  Int3 at{};
+  for (at[2] = 0; at[2] < level.cells[2]; ++at[2])
+    for (at[1] = 0; at[1] < level.cells[1]; ++at[1])
+      for (at[0] = 0; at[0] < level.cells[0]; ++at[0]) {
+        const std::ptrdiff_t c = level.index(at[0], at[1], at[2]);
+        float sum = 0;
+        for (int d = 0; d < 3; ++d) {
+          const float low = level.coupling[d][c], high = level.coupling[d][c + level.stride(d)];
+          const bool closes = decomposition_.periodic(d) && level.global[d] % 2 == 1;
+          const int cell = first[d] + at[d];
+          sum += (closes && cell == 0 ? 2 : 1) * low + (closes && cell == level.global[d] - 1 ? 2 : 1) * high;
+        }
+        const float share = &level == &levels_.back() ? 1 : static_cast<float>(relaxation);
+        level.inverse[c] = sum > 0 ? share / sum : 0;
+      }
+}
+
+// Both faces a cell and direction, for the last face of the box is no cell's lower one.
+void Multigrid::gather_couplings(const Level& from, Level& to) {
+  send_.clear();
+  for (int k = 0; k < from.cells[2]; ++k)
+    for (int j = 0; j < from.cells[1]; ++j)
+      for (int i = 0; i < from.cells[0]; ++i)
+        for (int d = 0; d < 3; ++d)
+          for (int side = 0; side < 2; ++side)
+            send_.push_back(static_cast<double>(from.coupling[d][from.index(i, j, k) + side * from.stride(d)]));
+  const std::vector<double> all = decomposition_.comm().gather_all(send_);
+  const double* next = all.data();
+  for (const std::ptrdiff_t c : order_)
+    for (int d = 0; d < 3; ++d)
+      for (int side = 0; side < 2; ++side) to.coupling[d][c + side * to.stride(d)] = static_cast<float>(*next++);
+}
+
+// The cells of the gathered level in the order in which the ranks send them.
+void Multigrid::set_order() {
+  const Level& to = levels_[gathered_];
+  Level block;  // of another rank
+  block.edges = levels_[gathered_ - 1].edges;
+  const Int3 ranks = decomposition_.ranks();
+  for (int rank = 0; rank < decomposition_.comm().size(); ++rank) {
+    block.place = {rank % ranks[0], rank / ranks[0] % ranks[1], rank / (ranks[0] * ranks[1])};
+    const Int3 low = block.first();
+    Int3 high;
+    for (int d = 0; d < 3; ++d) high[d] = low[d] + static_cast<int>(block.edges[d][block.place[d]].size());
+    for (int k = low[2]; k < high[2]; ++k)
+      for (int j = low[1]; j < high[1]; ++j)
+        for (int i = low[0]; i < high[0]; ++i) order_.push_back(to.index(i, j, k));
+  }
+}
+
+}  // namespace bedflow
