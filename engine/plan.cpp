@@ -71,6 +71,18 @@ void plan_time(Plan& plan) {
   }
 }
 
+void plan_seeds(Plan& plan) {
+  const ParticleScene& particles = *plan.scene.particles;
+  if (particles.kinds.size() > 1 || !particles.kinds.front().sizes.constant())
+    throw Stop(Reason::invalid_case, "particles.types: not built yet: more than one type and size");
+  const auto [low, high] = seed_extent(particles.regions);
+  for (const SeedRegion& region : particles.regions) plan.particle_count += expected_count(particles.kinds, region);
+  for (int d = 0; d < 3; ++d) {
+    const double g = plan.scene.gravity[d], way = g < 0 ? high[d] : plan.scene.size[d] - low[d];
+    if (std::abs(g) > 0.5 * norm(plan.scene.gravity)) plan.fall_time = std::max(plan.fall_time, std::sqrt(2 * way / std::abs(g)));
+  }
+}
+
 void plan_space(Plan& plan) {
   const Scene& scene = plan.scene;
   bool shared = plan.ranks > 1;
@@ -101,7 +113,7 @@ void plan_space(Plan& plan) {
     plan.narrowest = {plan.ghosts, plan.ghosts, plan.ghosts};
   }
   plan.cell_count = scene.gas ? static_cast<std::int64_t>(scene.cells[0]) * scene.cells[1] * scene.cells[2] : 0;
-  plan.particle_count = scene.particles ? scene.particles->count : 0;
+  if (scene.particles) plan_seeds(plan);
 }
 
 void plan_cost(Plan& plan) {
@@ -119,10 +131,9 @@ void plan_cost(Plan& plan) {
   const double substep = factor * (scene.coupling ? fluidized_substep_seconds : resting_substep_seconds);
   plan.seconds =
       steps * (cells * cell_step_seconds + (scene.coupling ? particles * particle_step_seconds : 0) + plan.substeps * substep);
-  if (const auto* random = scene.particles ? std::get_if<RandomPlaces>(&scene.particles->places) : nullptr;
-      random && random->settling) {
-    const double fall = 1.2 * std::sqrt(2 * random->seeds.high.y / norm(scene.gravity));  // it is at rest soon after
-    plan.seconds += std::min(fall, random->settling->duration) / plan.substep * factor * resting_substep_seconds;
+  if (scene.particles && scene.particles->settling) {
+    const double settled = std::min(1.2 * plan.fall_time, scene.particles->settling->duration);  // at rest soon after
+    plan.seconds += settled / plan.substep * factor * resting_substep_seconds;
   }
   plan.seconds /= plan.ranks;
 }
@@ -157,10 +168,8 @@ void plan_parts(Plan& plan) {
     add("rotation", rotation, rotation ? "the tangential law turns the particles" : "without friction nothing turns them");
     add("contact history", history, history ? "the tangential spring remembers" : "the tangential law has no memory");
     add("radius per particle", false, "all have one size");
-    if (const auto* random = std::get_if<RandomPlaces>(&scene.particles->places)) {
-      add("settling before time 0", random->settling.has_value(),
-          random->settling ? "asked for by the seeding" : "not asked for");
-    }
+    const bool settling = scene.particles->settling.has_value();
+    add("settling before time 0", settling, settling ? "asked for by the seeding" : "not asked for");
   }
   add("coupling", scene.coupling.has_value(),
       scene.coupling ? "gas and particles are both there" : "there is only one of the two");

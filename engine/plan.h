@@ -27,6 +27,7 @@ struct Plan {
   Int3 narrowest{1, 1, 1};   // fewest cells of a rank's block a direction
   int ghosts = 1;            // layers of the gas grid
   int tall = -1;             // direction that is cut last among ranks
+  double fall_time = 0;      // s, a seeded particle's to the other side of the box; 0 without gravity
   double drag_limit = 0;     // 2m/b at the heaviest drag in sight, s; 0 without coupling
 
   double cell_ratio = 0;  // Δ*; 0 unless gas and particles

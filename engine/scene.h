@@ -23,28 +23,20 @@ struct GasScene {
   Vec3 initial_velocity;  // m/s
 };
 
-// Where the particles come from.
+// Of seeded particles before time 0.
 struct Settling {
   double duration = 0;       // s, at most
   double rest_velocity = 0;  // m/s, root mean square
   PairAndWall<LinearSpringDashpot> contact;
 };
-struct RandomPlaces {
-  RandomSeeds seeds;
-  std::optional<Settling> settling;
-};
-struct LatticePlaces {
-  Int3 count{};
-  Vec3 low, high;  // m
-};
-using PlacedSpheres = std::vector<PlacedSphere>;
-using Places = std::variant<RandomPlaces, LatticePlaces, PlacedSpheres>;
 
 using ContactLaw = std::variant<PairAndWall<LinearSpringDashpot>>;
 using TangentialLaw = std::variant<PairAndWall<Frictionless>, PairAndWall<Coulomb>, PairAndWall<TangentialSpring>>;
 
 struct ParticleScene {
-  std::int64_t count = 0;
+  std::vector<SeedKind> kinds;      // types, one at least
+  std::vector<SeedRegion> regions;  // where they are at time 0
+  std::optional<Settling> settling;
   double diameter = 0;             // m
   double density = 0;              // kg/m³
   double mass = 0;                 // kg
@@ -53,7 +45,6 @@ struct ParticleScene {
   double skin = 0;                 // m; 0: chosen by the plan
   ContactLaw contact;
   TangentialLaw tangential;
-  Places places;
 };
 
 struct CouplingScene {

@@ -35,17 +35,6 @@ DemSetup dem_setup(const Plan& plan) {
   return setup;
 }
 
-// The owned particles at time 0, by where the case wants them.
-struct Seeder {
-  const Decomposition& decomposition;
-  double radius;
-  ParticleStore operator()(const RandomPlaces& places) const { return seed_random(decomposition, radius, places.seeds); }
-  ParticleStore operator()(const LatticePlaces& places) const {
-    return seed_lattice(decomposition, radius, places.count, places.low, places.high);
-  }
-  ParticleStore operator()(const PlacedSpheres& places) const { return seed_placed(decomposition, places); }
-};
-
 }  // namespace
 
 // ------------------------------------------------------------------------------------------------ parts
@@ -177,27 +166,24 @@ void Simulation::seed() {
   }
   if (dem_) {
     const ParticleScene& particles = *plan_.scene.particles;
-    ParticleStore seeds = std::visit(Seeder{decomposition_, particles.diameter / 2}, particles.places);
-    dem_->set_particles(std::move(seeds));
+    dem_->set_particles(keep_owned(decomposition_, seed_spheres(particles.kinds, particles.regions)));
     particle_count_ = decomposition_.comm().sum(static_cast<std::int64_t>(dem_->particles().owned));
   }
   if (coupling_) hidden_solids_ = coupling_->transfer.deposit_volume(dem_->particles(), gas_->state.fraction);
 }
 
 bool Simulation::settle() {
-  const auto* random = dem_ ? std::get_if<RandomPlaces>(&plan_.scene.particles->places) : nullptr;
-  if (!random || !random->settling || particle_count_ == 0) return false;
-  const Settling& settling = *random->settling;
+  if (!dem_ || !plan_.scene.particles->settling || particle_count_ == 0) return false;
+  const Settling& settling = *plan_.scene.particles->settling;
   constexpr int substeps = 100;
   std::visit([&](const auto& tangential) { dem_->advance(substeps, plan_.substep, settling.contact, tangential); },
              plan_.scene.particles->tangential);
   settled_time_ += substeps * plan_.substep;
   dem_->take_max_overlap();
   // Not before the highest has had the time to fall: at the start all are slow.
-  const double fall = std::sqrt(2 * random->seeds.high.y / norm(plan_.scene.gravity));
   const double energy = decomposition_.comm().sum(dem_->kinetic_energy());
   const double speed = std::sqrt(2 * energy / (static_cast<double>(particle_count_) * plan_.scene.particles->mass));
-  if (settled_time_ < settling.duration && (settled_time_ < fall || speed > settling.rest_velocity)) return true;
+  if (settled_time_ < settling.duration && (settled_time_ < plan_.fall_time || speed > settling.rest_velocity)) return true;
   if (coupling_) hidden_solids_ = coupling_->transfer.deposit_volume(dem_->particles(), gas_->state.fraction);
   return false;
 }

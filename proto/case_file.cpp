@@ -12,6 +12,7 @@
 #include "case_parser.h"
 #include "case_rules.h"
 #include "case_walker.h"
+#include "sphere_table.h"
 
 namespace bedflow {
 namespace {
@@ -30,16 +31,22 @@ bool is_json(const std::string& text) {
   return first != std::string::npos && text[first] == '{';
 }
 
-}  // namespace
-
-CaseRead read_case(const std::string& text) {
+// folder: where tables that the case names are looked for; null: nowhere.
+CaseRead read_case_text(const std::string& text, const std::filesystem::path* folder) {
   CaseParse parse = is_json(text) ? parse_case_json(text) : parse_case_text(text);
   CaseRead result{std::move(parse.value), std::move(parse.faults)};
   if (parse.read_to_end) {
+    if (folder != nullptr && !inline_sphere_tables(result.value, *folder, result.faults)) return result;
     for (CaseFault& fault : check_case(result.value)) result.faults.push_back(std::move(fault));
   }
   shorten(result.faults);
   return result;
+}
+
+}  // namespace
+
+CaseRead read_case(const std::string& text) {
+  return read_case_text(text, nullptr);
 }
 
 CaseRead read_case_file(const std::filesystem::path& path) {
@@ -51,7 +58,8 @@ CaseRead read_case_file(const std::filesystem::path& path) {
     const std::string why = std::filesystem::is_directory(path) ? "is a folder" : std::strerror(errno);
     return {{}, {{path.string(), "cannot be read: " + why + "; give the path of a case file ('bedflow init' writes one)"}}};
   }
-  return read_case(text.str());
+  const std::filesystem::path folder = path.parent_path();
+  return read_case_text(text.str(), &folder);
 }
 
 std::vector<CaseFault> check_case(const v1::Case& value) {
@@ -59,6 +67,7 @@ std::vector<CaseFault> check_case(const v1::Case& value) {
   check_scene(value, faults);
   check_faces(value, faults);
   check_particles(value, faults);
+  check_seeding(value, faults);
   check_monitors(value, faults);
   shorten(faults);
   return faults;

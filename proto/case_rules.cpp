@@ -41,8 +41,9 @@ void check_time(const v1::Case& value, CaseFaults& faults) {
 // one particle's worth of volume with room to spare, Δ* = ∛(dx dy dz)/d ≥ 1, or ε falls to 0 in it.
 void check_cells_against_diameter(const v1::Case& value, CaseFaults& faults) {
   if (!value.has_gas() || !value.has_particles() || !value.coupling().has_hat() || !value.domain().has_cells()) return;
-  const double diameter = value.particles().diameter();
-  const std::string d = "particles.diameter, " + number_text(diameter) + " m";
+  const double diameter = largest_diameter(value.particles());
+  const std::string d =
+      (value.particles().types_size() > 0 ? "the largest diameter, " : "particles.diameter, ") + number_text(diameter) + " m";
   double volume = 1;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const double length = component(value.domain().size(), axis);

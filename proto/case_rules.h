@@ -14,7 +14,8 @@ using CaseFaults = std::vector<CaseFault>;
 
 void check_scene(const v1::Case& value, CaseFaults& faults);      // what must be there together; time; grid and kernel
 void check_faces(const v1::Case& value, CaseFaults& faults);      // periodic directions, walls, patches, balance of flows
-void check_particles(const v1::Case& value, CaseFaults& faults);  // where they are at time 0, contacts' reach
+void check_particles(const v1::Case& value, CaseFaults& faults);  // types and sizes, contacts' reach
+void check_seeding(const v1::Case& value, CaseFaults& faults);    // where they are at time 0
 void check_monitors(const v1::Case& value, CaseFaults& faults);   // monitors and the references that belong to them
 
 constexpr std::array<const char*, 3> axis_names{"x", "y", "z"};
@@ -29,5 +30,15 @@ auto component(const Components& value, std::size_t axis) {
 // corners low and high.
 void check_extent(const v1::Case& value, const v1::Vector& low, const v1::Vector& high, std::size_t axis, const std::string& path,
                   CaseFaults& faults);
+
+// Of all types together, or of one; 0 where the case does not say.
+double largest_diameter(const v1::Particles& particles);
+double largest_diameter(const v1::ParticleType& type);
+double smallest_diameter(const v1::ParticleType& type);
+
+using TypeShares = google::protobuf::RepeatedPtrField<v1::TypeShare>;
+const v1::ParticleType* type_named(const v1::Particles& particles, const std::string& name);  // null: there is none
+void check_type_name(const v1::Particles& particles, const std::string& name, const std::string& path, CaseFaults& faults);
+void check_shares(const v1::Particles& particles, const TypeShares& shares, const std::string& path, CaseFaults& faults);
 
 }  // namespace bedflow

@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "case_rules.h"
 #include "parameter_text.h"
 
@@ -34,6 +36,64 @@ void check_patches(const v1::Case& value, const v1::Face& face, const std::strin
   }
 }
 
+double widest(const v1::Particles& particles, const TypeShares& types) {
+  if (types.empty()) return largest_diameter(particles);
+  double widest = 0;
+  for (const v1::TypeShare& share : types)
+    if (const v1::ParticleType* type = type_named(particles, share.type())) widest = std::max(widest, largest_diameter(*type));
+  return widest;
+}
+
+void check_inflow_patch(const v1::Case& value, const v1::ParticleInflow& inflow, const std::string& path, std::size_t axis,
+                        CaseFaults& faults) {
+  if (!inflow.patch().has_low() || !inflow.patch().has_high()) return;
+  const double diameter = widest(value.particles(), inflow.types());
+  for (std::size_t along = 0; along < 3; ++along) {
+    if (along == axis) continue;
+    check_extent(value, inflow.patch().low(), inflow.patch().high(), along, path + ".patch", faults);
+    const double edge = component(inflow.patch().high(), along) - component(inflow.patch().low(), along);
+    if (!(edge > 0) || edge >= diameter) continue;
+    faults.push_back({path + ".patch.high." + axis_names[along], "leaves the patch " + number_text(edge) + " m along " +
+                                                                     axis_names[along] + ": particles as large as " +
+                                                                     number_text(diameter) + " m must fit through"});
+  }
+}
+
+void check_particle_inflow(const v1::Case& value, const v1::ParticleInflow& inflow, const std::string& path, std::size_t axis,
+                           bool high, CaseFaults& faults) {
+  if (inflow.has_mass_rate() == inflow.has_number_rate()) {
+    faults.push_back({path + ".mass_rate", inflow.has_mass_rate() ? "is set, and so is number_rate: remove one of the two"
+                                                                  : "is missing, and so is number_rate: set one of the two"});
+  }
+  const double inward = component(inflow.velocity(), axis) * (high ? -1 : 1);
+  if (inflow.has_velocity() && !(inward > 0)) {
+    faults.push_back({path + ".velocity." + axis_names[axis], "is " + number_text(component(inflow.velocity(), axis)) +
+                                                                  " m/s: to come in through this face it must be " +
+                                                                  (high ? "below 0" : "above 0")});
+  }
+  if (inflow.has_until() && !(inflow.until() > inflow.from())) {
+    faults.push_back({path + ".until",
+                      "is " + number_text(inflow.until()) + " s: it must be after from, " + number_text(inflow.from()) + " s"});
+  }
+  check_shares(value.particles(), inflow.types(), path + ".types", faults);
+  check_inflow_patch(value, inflow, path, axis, faults);
+}
+
+void check_particles_at(const v1::Case& value, const v1::Face& face, const std::string& path, std::size_t axis,
+                        CaseFaults& faults) {
+  for (int i = 0; i < face.particle_inflows_size(); ++i)
+    check_particle_inflow(value, face.particle_inflows(i), item_path(path + ".particle_inflows", i), axis, path.ends_with("high"),
+                          faults);
+  if (face.particle_inflows_size() > 0 && !value.has_particles()) {
+    faults.push_back({path + ".particle_inflows",
+                      "lets particles in, but the case has no particles: add them, with empty {} if "
+                      "none is there at time 0"});
+  }
+  if (face.outflow().screen() && face.outflow().particles() == v1::LEAVE) {
+    faults.push_back({path + ".outflow.particles", "is LEAVE, but screen is true and holds them back: remove one of the two"});
+  }
+}
+
 bool lets_gas_in(const v1::Inflow& inflow) {
   bool flows = inflow.velocity() > 0 || inflow.ramp().from() > 0;
   for (const v1::Patch& patch : inflow.patches()) flows = flows || patch.velocity() > 0 || patch.ramp().from() > 0;
@@ -52,6 +112,7 @@ void check_faces(const v1::Case& value, CaseFaults& faults) {
     }
     check_wall(face, path, axis, faults);
     check_patches(value, face, path, axis, faults);
+    check_particles_at(value, face, path, axis, faults);
     if (face.has_inflow() && lets_gas_in(face.inflow())) inflow = path + ".inflow";
     has_outflow = has_outflow || face.has_outflow();
   });

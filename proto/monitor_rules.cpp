@@ -25,6 +25,9 @@ Needs needs_of(v1::Monitor::QuantityCase quantity) {
     case v1::Monitor::kParticleCount:
     case v1::Monitor::kParticleVelocity:
     case v1::Monitor::kParticleMomentum:
+    case v1::Monitor::kParticleMass:
+    case v1::Monitor::kMassEntered:
+    case v1::Monitor::kMassLeft:
       return {.gas = false, .particles = true};
     case v1::Monitor::QUANTITY_NOT_SET:
       break;
@@ -81,6 +84,8 @@ void check_quantity(const v1::Case& value, const v1::Monitor& monitor, const std
   if (monitor.has_bed_height()) check_inside(value, monitor.bed_height().above(), 1, path + ".above", faults);
   if (monitor.has_pressure_drop()) check_pressure_drop(value, monitor.pressure_drop(), path, faults);
   if (monitor.has_void_fraction()) check_inside(value, monitor.void_fraction().height(), 1, path + ".height", faults);
+  check_type_name(value.particles(), monitor.particle_count().type(), path + ".type", faults);
+  check_type_name(value.particles(), monitor.particle_mass().type(), path + ".type", faults);
   if (monitor.has_particle_velocity()) check_velocity_profile(value, monitor.particle_velocity(), path, faults);
   if (is_profile(monitor) && !monitor.has_averaging()) {
     faults.push_back({monitor_path + ".averaging", "is missing: a profile keeps averages only; set the length of a bin"});

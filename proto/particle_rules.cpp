@@ -1,7 +1,6 @@
 #include <algorithm>
-#include <cmath>
-#include <numbers>
-#include <numeric>
+#include <limits>
+#include <set>
 
 #include "case_rules.h"
 #include "parameter_text.h"
@@ -9,30 +8,129 @@
 namespace bedflow {
 namespace {
 
-// Random placing without overlap: beyond this solids fraction it takes too many tries (saturation is near 0.38).
-constexpr double densest_random_fraction = 0.35;
-// The closest that neighbours of a lattice may be, in diameters: a slight overlap is a preloaded packing, more is a mistake.
-constexpr double closest_lattice = 0.9;
+struct Range {
+  double smallest = 0, largest = 0;  // m; 0 where the case does not say
+};
 
-double edge_of(const v1::Box& box, std::size_t axis) {
-  return component(box.high(), axis) - component(box.low(), axis);
+Range range_of(const v1::ParticleType& type) {
+  switch (type.sizes_case()) {
+    case v1::ParticleType::kConstant:
+      return {type.constant().diameter(), type.constant().diameter()};
+    case v1::ParticleType::kUniform:
+      return {type.uniform().smallest(), type.uniform().largest()};
+    case v1::ParticleType::kNormal:
+      return {type.normal().smallest(), type.normal().largest()};
+    case v1::ParticleType::kLogNormal:
+      return {type.log_normal().smallest(), type.log_normal().largest()};
+    case v1::ParticleType::kDiscrete: {
+      Range range;
+      for (const v1::SizeClass& size : type.discrete().classes()) {
+        range.largest = std::max(range.largest, size.diameter());
+        range.smallest = range.smallest > 0 ? std::min(range.smallest, size.diameter()) : size.diameter();
+      }
+      return range;
+    }
+    case v1::ParticleType::kHistogram: {
+      const auto& classes = type.histogram().classes();
+      return {type.histogram().smallest(), classes.empty() ? 0 : classes[classes.size() - 1].diameter()};
+    }
+    default:
+      return {};
+  }
 }
 
-v1::Box whole_domain(const v1::Case& value) {
-  v1::Box box;
-  box.mutable_high()->set_x(value.domain().size().x());
-  box.mutable_high()->set_y(value.domain().size().y());
-  box.mutable_high()->set_z(value.domain().size().z());
-  return box;
+// One kind of particle is told by diameter and density, several by types: one of the two ways.
+void check_kinds(const v1::Particles& particles, CaseFaults& faults) {
+  const bool types = particles.types_size() > 0;
+  const auto check = [&](const char* name, bool given, const char* what) {
+    const std::string path = std::string("particles.") + name;
+    if (given && types)
+      faults.push_back({path, "is set, and so is particles.types, where each type has its own: remove one of the two"});
+    if (!given && !types)
+      faults.push_back({path, std::string("is missing: ") + what + "; set it, or particles.types for several types or sizes"});
+  };
+  check("diameter", particles.has_diameter(), "the diameter of the particles, in m");
+  check("density", particles.has_density(), "the density of the solid, in kg/m³");
+}
+
+void check_order(double smallest, double largest, const std::string& path, CaseFaults& faults) {
+  if (smallest > 0 && largest > 0 && !(smallest < largest)) {
+    faults.push_back({path + ".largest", "is " + number_text(largest) + " m: it must be above " + path + ".smallest, " +
+                                             number_text(smallest) + " m (for one size set constant)"});
+  }
+}
+
+void check_middle(double middle, const char* name, double smallest, double largest, const std::string& path, CaseFaults& faults) {
+  if (!(middle > 0) || !(smallest < largest) || (middle > smallest && middle < largest)) return;
+  faults.push_back({path + "." + name, "is " + number_text(middle) + " m: it must be between smallest, " + number_text(smallest) +
+                                           " m, and largest, " + number_text(largest) + " m"});
+}
+
+template <class Items>
+void check_sum(const Items& items, const std::string& path, CaseFaults& faults) {
+  if (items.empty() || std::ranges::any_of(items, [](const auto& item) { return !item.has_share() || item.share() != 0; }))
+    return;
+  faults.push_back({path, "has shares that are all 0: set at least one above 0"});
+}
+
+void check_classes(const v1::ParticleType& type, const std::string& path, CaseFaults& faults) {
+  const bool histogram = type.has_histogram();
+  const auto& classes = histogram ? type.histogram().classes() : type.discrete().classes();
+  const std::string list = path + (histogram ? ".histogram.classes" : ".discrete.classes");
+  check_sum(classes, list, faults);
+  double before = histogram ? type.histogram().smallest() : 0;
+  for (int i = 0; histogram && i < classes.size(); ++i) {
+    const double diameter = classes[i].diameter();
+    if (before > 0 && diameter > 0 && !(diameter > before)) {
+      faults.push_back({item_path(list, i) + ".diameter",
+                        "is " + number_text(diameter) + " m: the classes must rise, it must be above " + number_text(before) +
+                            " m, " + (i == 0 ? "histogram.smallest" : "the diameter of the class before")});
+    }
+    before = diameter;
+  }
+}
+
+void check_sizes(const v1::ParticleType& type, const std::string& path, CaseFaults& faults) {
+  const auto [smallest, largest] = range_of(type);
+  if (type.has_uniform()) check_order(smallest, largest, path + ".uniform", faults);
+  if (type.has_normal()) {
+    check_order(smallest, largest, path + ".normal", faults);
+    check_middle(type.normal().mean(), "mean", smallest, largest, path + ".normal", faults);
+  }
+  if (type.has_log_normal()) {
+    check_order(smallest, largest, path + ".log_normal", faults);
+    check_middle(type.log_normal().median(), "median", smallest, largest, path + ".log_normal", faults);
+  }
+  if (type.has_discrete() || type.has_histogram()) check_classes(type, path, faults);
+}
+
+void check_types(const v1::Particles& particles, CaseFaults& faults) {
+  std::set<std::string> names;
+  for (int i = 0; i < particles.types_size(); ++i) {
+    const v1::ParticleType& type = particles.types(i);
+    const std::string path = item_path("particles.types", i);
+    if (!type.name().empty() && !names.insert(type.name()).second)
+      faults.push_back({path + ".name", "is \"" + type.name() + "\", the name of another type: give each its own"});
+    check_sizes(type, path, faults);
+  }
+  check_sum(particles.types(), "particles.types", faults);
+}
+
+// Where the largest diameter is said.
+std::string largest_path(const v1::Particles& particles) {
+  for (int i = 0; i < particles.types_size(); ++i)
+    if (range_of(particles.types(i)).largest == largest_diameter(particles)) return item_path("particles.types", i);
+  return "particles.diameter";
 }
 
 void check_diameter(const v1::Case& value, CaseFaults& faults) {
-  const double diameter = value.particles().diameter();
+  const double diameter = largest_diameter(value.particles());
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const double size = component(value.domain().size(), axis);
     if (!(size > 0) || !(diameter > size)) continue;
-    faults.push_back({"particles.diameter", "is " + number_text(diameter) + " m, larger than the domain: at most domain.size." +
-                                                axis_names[axis] + ", " + number_text(size) + " m"});
+    faults.push_back({largest_path(value.particles()), "is " + number_text(diameter) +
+                                                           " m, larger than the domain: at most domain.size." + axis_names[axis] +
+                                                           ", " + number_text(size) + " m"});
   }
 }
 
@@ -47,121 +145,53 @@ void check_skin(const v1::Case& value, CaseFaults& faults) {
   }
 }
 
-void check_region(const v1::Case& value, const v1::Box& region, const std::string& path, CaseFaults& faults) {
-  if (!region.has_low() || !region.has_high()) return;
-  const double diameter = value.particles().diameter();
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    check_extent(value, region.low(), region.high(), axis, path, faults);
-    const double edge = edge_of(region, axis);
-    if (edge > 0 && edge < diameter) {
-      faults.push_back({path + ".high." + axis_names[axis], "leaves the region " + number_text(edge) + " m along " +
-                                                                axis_names[axis] + ": at least particles.diameter, " +
-                                                                number_text(diameter) + " m, is needed"});
-    }
-  }
-}
-
-void check_random_count(const v1::Case& value, const v1::Box& region, CaseFaults& faults) {
-  const double d = value.particles().diameter();
-  const double volume = edge_of(region, 0) * edge_of(region, 1) * edge_of(region, 2);
-  const double sphere = std::numbers::pi / 6 * d * d * d;
-  const double fraction = value.particles().random().count() * sphere / volume;
-  if (!(volume > 0) || !(d > 0) || !(fraction > densest_random_fraction)) return;
-  faults.push_back({"particles.random.count", "is " + std::to_string(value.particles().random().count()) +
-                                                  ", a solids fraction of " + number_text(std::round(fraction * 1e3) / 1e3) +
-                                                  " in particles.random.region: random placing reaches " +
-                                                  number_text(densest_random_fraction) + ", which is " +
-                                                  number_text(std::floor(densest_random_fraction * volume / sphere)) +
-                                                  " particles; make the region higher, or place fewer"});
-}
-
-void check_settling(const v1::Case& value, CaseFaults& faults) {
-  if (!value.particles().random().has_settling() || !value.has_gravity()) return;
-  const std::string path = "particles.random.settling";
-  bool pulls = false;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const double g = component(value.gravity(), axis);
-    pulls = pulls || g != 0;
-    if (g != 0 && component(value.domain().periodic(), axis)) {
-      faults.push_back({path, "never ends: gravity." + std::string(axis_names[axis]) + " is " + number_text(g) +
-                                  " m/s² and domain.periodic." + axis_names[axis] + " is true, so the particles fall for ever"});
-    }
-  }
-  if (!pulls) faults.push_back({path, "needs gravity, but gravity is 0: remove settling or set gravity"});
-}
-
-void check_random(const v1::Case& value, CaseFaults& faults) {
-  const v1::RandomSeeding& random = value.particles().random();
-  if (random.has_region()) check_region(value, random.region(), "particles.random.region", faults);
-  check_random_count(value, random.has_region() ? random.region() : whole_domain(value), faults);
-  check_settling(value, faults);
-}
-
-void check_lattice(const v1::Case& value, CaseFaults& faults) {
-  const v1::Lattice& lattice = value.particles().lattice();
-  if (lattice.has_region()) check_region(value, lattice.region(), "particles.lattice.region", faults);
-  const v1::Box region = lattice.has_region() ? lattice.region() : whole_domain(value);
-  const double diameter = value.particles().diameter();
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const std::uint32_t count = component(lattice.count(), axis);
-    const double edge = edge_of(region, axis);
-    if (count < 2 || !(edge > 0) || !(edge / count < closest_lattice * diameter)) continue;
-    faults.push_back({"particles.lattice.count." + std::string(axis_names[axis]),
-                      "is " + std::to_string(count) + ", a spacing of " + number_text(edge / count) + " m: at least " +
-                          number_text(closest_lattice) + " of particles.diameter, " + number_text(diameter) +
-                          " m, is needed; use at most " + number_text(std::floor(edge / diameter * (1 + 1e-9)))});
-  }
-}
-
-std::string sphere_path(int index) {
-  return item_path("particles.placed.spheres", index) + ".position";
-}
-
-void check_centres(const v1::Case& value, CaseFaults& faults) {
-  const auto& spheres = value.particles().placed().spheres();
-  for (int i = 0; i < spheres.size(); ++i) {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const double x = component(spheres[i].position(), axis);
-      const double size = component(value.domain().size(), axis);
-      if (!(x > size)) continue;
-      faults.push_back({sphere_path(i) + "." + axis_names[axis], "is " + number_text(x) +
-                                                                     " m, outside the domain: at most domain.size." +
-                                                                     axis_names[axis] + ", " + number_text(size) + " m"});
-    }
-  }
-}
-
-// Two centres at one point have no normal between them; any other overlap is allowed, as a preloaded contact.
-void check_coincidence(const v1::Case& value, CaseFaults& faults) {
-  const auto& spheres = value.particles().placed().spheres();
-  const auto place = [&](int i) {
-    const v1::Vector& p = spheres[i].position();
-    return std::array{p.x(), p.y(), p.z()};
-  };
-  std::vector<int> order;
-  for (int i = 0; i < spheres.size(); ++i) {
-    const auto p = place(i);
-    if (spheres[i].has_position() && std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2])) order.push_back(i);
-  }
-  std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return place(a) < place(b); });
-  for (std::size_t k = 1; k < order.size(); ++k) {
-    if (place(order[k - 1]) != place(order[k])) continue;
-    faults.push_back({sphere_path(order[k]), "is the same point as " + sphere_path(order[k - 1]) + ": move one of them"});
-  }
-}
-
 }  // namespace
+
+double largest_diameter(const v1::Particles& particles) {
+  double largest = particles.diameter();
+  for (const v1::ParticleType& type : particles.types()) largest = std::max(largest, range_of(type).largest);
+  return largest;
+}
+
+double smallest_diameter(const v1::ParticleType& type) {
+  return range_of(type).smallest;
+}
+
+double largest_diameter(const v1::ParticleType& type) {
+  return range_of(type).largest;
+}
+
+const v1::ParticleType* type_named(const v1::Particles& particles, const std::string& name) {
+  const auto found = std::ranges::find(particles.types(), name, [](const v1::ParticleType& type) { return type.name(); });
+  return found == particles.types().end() ? nullptr : &*found;
+}
+
+void check_type_name(const v1::Particles& particles, const std::string& name, const std::string& path, CaseFaults& faults) {
+  if (name.empty() || type_named(particles, name) != nullptr) return;
+  std::string names;
+  for (const v1::ParticleType& type : particles.types()) names += (names.empty() ? "" : ", ") + type.name();
+  faults.push_back(
+      {path, "is \"" + name + "\", but " +
+                 (names.empty() ? "the case has no particles.types: remove it" : "the types in particles.types are " + names)});
+}
+
+void check_shares(const v1::Particles& particles, const TypeShares& shares, const std::string& path, CaseFaults& faults) {
+  std::set<std::string> names;
+  for (int i = 0; i < shares.size(); ++i) {
+    const std::string item = item_path(path, i) + ".type";
+    check_type_name(particles, shares[i].type(), item, faults);
+    if (!shares[i].type().empty() && !names.insert(shares[i].type()).second)
+      faults.push_back({item, "is \"" + shares[i].type() + "\" again: name each type once"});
+  }
+  check_sum(shares, path, faults);
+}
 
 void check_particles(const v1::Case& value, CaseFaults& faults) {
   if (!value.has_particles()) return;
+  check_kinds(value.particles(), faults);
+  check_types(value.particles(), faults);
   check_diameter(value, faults);
   check_skin(value, faults);
-  if (value.particles().has_random()) check_random(value, faults);
-  if (value.particles().has_lattice()) check_lattice(value, faults);
-  if (value.particles().has_placed()) {
-    check_centres(value, faults);
-    check_coincidence(value, faults);
-  }
 }
 
 }  // namespace bedflow

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "case/seeding_scene.h"
 #include "case_file.h"
 
 namespace bedflow {
@@ -105,71 +106,28 @@ TangentialLaw tangential(const v1::Particles& from, const PairAndWall<LinearSpri
   }
 }
 
-Places places(const v1::Case& from, double mass) {
-  const v1::Particles& particles = from.particles();
-  const Vec3 size{from.domain().size().x(), from.domain().size().y(), from.domain().size().z()};
-  const auto low = [&](bool given, const v1::Box& box) { return given ? vec(box.low()) : Vec3{}; };
-  const auto high = [&](bool given, const v1::Box& box) { return given ? vec(box.high()) : size; };
-  switch (particles.seeding_case()) {
-    case v1::Particles::kPlaced: {
-      PlacedSpheres spheres;
-      for (const v1::Sphere& sphere : particles.placed().spheres()) {
-        spheres.push_back({vec(sphere.position()), vec(sphere.velocity()), vec(sphere.spin())});
-      }
-      return spheres;
-    }
-    case v1::Particles::kLattice: {
-      const v1::Lattice& lattice = particles.lattice();
-      return LatticePlaces{
-          {static_cast<int>(lattice.count().x()), static_cast<int>(lattice.count().y()), static_cast<int>(lattice.count().z())},
-          low(lattice.has_region(), lattice.region()),
-          high(lattice.has_region(), lattice.region())};
-    }
-    default: {
-      const v1::RandomSeeding& random = particles.random();
-      RandomPlaces result{{.count = random.count(),
-                           .seed = random.seed(),
-                           .low = low(random.has_region(), random.region()),
-                           .high = high(random.has_region(), random.region()),
-                           .velocity_deviation = random.velocity_deviation()},
-                          {}};
-      if (random.has_settling()) {
-        const v1::Settling& settling = random.settling();
-        result.settling =
-            Settling{settling.duration(), settling.rest_velocity(),
-                     springs(particles.linear_spring_dashpot(), mass, settling.restitution(), settling.restitution())};
-      }
-      return result;
-    }
-  }
-}
-
-std::int64_t count_of(const v1::Particles& from) {
-  if (from.has_placed()) return from.placed().spheres_size();
-  if (from.has_lattice()) {
-    const v1::Cells& n = from.lattice().count();
-    return static_cast<std::int64_t>(n.x()) * n.y() * n.z();
-  }
-  return from.random().count();
-}
-
 ParticleScene particle_scene(const v1::Case& from) {
   const v1::Particles& particles = from.particles();
   const v1::LinearSpringDashpot& law = particles.linear_spring_dashpot();
-  const double d = particles.diameter(), mass = particles.density() * std::numbers::pi / 6 * d * d * d;
+  const std::vector<SeedKind> kinds = seed_kinds(particles);
+  const double d = kinds.front().sizes.largest(), mass = kinds.front().density * std::numbers::pi / 6 * d * d * d;
   const auto contact =
       springs(law, mass, law.restitution(), law.has_wall_restitution() ? law.wall_restitution() : law.restitution());
   ParticleScene scene;
-  scene.count = count_of(particles);
+  scene.kinds = kinds;
+  scene.regions = seed_regions(from, kinds);
+  if (const v1::Settling* settling = settling_of(particles)) {
+    scene.settling = Settling{settling->duration(), settling->rest_velocity(),
+                              springs(law, mass, settling->restitution(), settling->restitution())};
+  }
   scene.diameter = d;
-  scene.density = particles.density();
+  scene.density = kinds.front().density;
   scene.mass = mass;
   scene.collision_time = std::min(contact.pair.collision_time(mass / 2), contact.wall.collision_time(mass));
   scene.steps_per_collision = particles.steps_per_collision();
   scene.skin = particles.skin();
   scene.contact = contact;
   scene.tangential = tangential(particles, contact);
-  scene.places = places(from, mass);
   return scene;
 }
 
@@ -210,7 +168,7 @@ CouplingScene coupling_scene(const v1::Coupling& from) {
   return scene;
 }
 
-Statistic statistic(const v1::Monitor& from) {
+Statistic statistic(const v1::Monitor& from, const v1::Particles& particles) {
   constexpr double everywhere = std::numeric_limits<double>::infinity();
   switch (from.quantity_case()) {
     case v1::Monitor::kBedHeight:
@@ -224,7 +182,13 @@ Statistic statistic(const v1::Monitor& from) {
     case v1::Monitor::kMaxOverlap:
       return MaxOverlap{};
     case v1::Monitor::kParticleCount:
-      return ParticleCount{};
+      return ParticleCount{type_index(particles, from.particle_count().type())};
+    case v1::Monitor::kParticleMass:
+      return ParticleMass{type_index(particles, from.particle_mass().type())};
+    case v1::Monitor::kMassEntered:
+      return MassEntered{};
+    case v1::Monitor::kMassLeft:
+      return MassLeft{};
     case v1::Monitor::kVoidFraction:
       return VoidFractionProfile{from.void_fraction().height()};
     case v1::Monitor::kParticleVelocity: {
@@ -244,6 +208,8 @@ Statistic statistic(const v1::Monitor& from) {
 }
 
 Side side(const v1::Face& face) {
+  if (face.particle_inflows_size() > 0 || face.outflow().particles() == v1::LEAVE)
+    throw Stop(Reason::invalid_case, "domain.faces: not built yet: particles that enter or leave");
   return face.has_outflow() && !face.outflow().screen() ? Side::open : Side::wall;
 }
 
@@ -267,7 +233,7 @@ Scene make_scene(const v1::Case& from) {
   if (from.time().has_step()) scene.longest_step = from.time().step();
   if (from.time().has_shortest_step()) scene.shortest_step = from.time().shortest_step();
   for (const v1::Monitor& monitor : from.monitors()) {
-    MonitorSetup setup{monitor.name(), statistic(monitor), monitor.interval()};
+    MonitorSetup setup{monitor.name(), statistic(monitor, from.particles()), monitor.interval()};
     if (monitor.has_averaging()) {
       setup.averaging_start = monitor.averaging().start();
       setup.averaging_bin = monitor.averaging().bin();

@@ -21,17 +21,18 @@ namespace bedflow {
 struct StatisticScene {
   Vec3 size;                   // edges of the box, m
   std::array<int, 3> cells{};  // of the whole gas grid
-  double radius = 0;           // of a particle, m
-  double mass = 0;             // of a particle, kg
 };
 struct ParticleValues {
-  Vec3 position, velocity;  // m, m/s
-  Vec3 spin;                // ω, rad/s; 0 without rotation
+  Vec3 position, velocity;      // m, m/s
+  Vec3 spin;                    // ω, rad/s; 0 without rotation
+  double radius = 0, mass = 0;  // m, kg
+  int type = 0;
 };
 // Of the step itself, the same on every rank.
 struct StepValues {
   double max_overlap = 0;  // over the diameter
   double mass_residual = 0, momentum_residual = 0;
+  double mass_entered = 0, mass_left = 0;  // particles, since time 0, kg
 };
 
 // What a statistic looks at. It has
@@ -47,8 +48,8 @@ struct KineticEnergy {
   static constexpr const char* unit = "J";
   static constexpr const char* meaning = "kinetic energy of the particles, translation and rotation";
   static constexpr Subject subject = Subject::particles;
-  void add(const StatisticScene& s, const ParticleValues& p, std::span<double> sums) const {
-    sums[0] += 0.5 * s.mass * (dot(p.velocity, p.velocity) + 0.4 * s.radius * s.radius * dot(p.spin, p.spin));
+  void add(const StatisticScene&, const ParticleValues& p, std::span<double> sums) const {
+    sums[0] += 0.5 * p.mass * (dot(p.velocity, p.velocity) + 0.4 * p.radius * p.radius * dot(p.spin, p.spin));
   }
 };
 
@@ -76,7 +77,21 @@ struct ParticleCount {
   static constexpr const char* unit = "1";
   static constexpr const char* meaning = "number of particles";
   static constexpr Subject subject = Subject::particles;
-  void add(const StatisticScene&, const ParticleValues&, std::span<double> sums) const { sums[0] += 1; }
+  int type = -1;  // -1: of all
+  void add(const StatisticScene&, const ParticleValues& p, std::span<double> sums) const {
+    if (type < 0 || p.type == type) sums[0] += 1;
+  }
+};
+
+struct ParticleMass {
+  static constexpr const char* name = "particle_mass";
+  static constexpr const char* unit = "kg";
+  static constexpr const char* meaning = "mass of the particles";
+  static constexpr Subject subject = Subject::particles;
+  int type = -1;  // -1: of all
+  void add(const StatisticScene&, const ParticleValues& p, std::span<double> sums) const {
+    if (type < 0 || p.type == type) sums[0] += p.mass;
+  }
 };
 
 // P_d = Σ m V_d
@@ -86,9 +101,7 @@ struct ParticleMomentum {
   static constexpr const char* meaning = "momentum of all particles in one direction";
   static constexpr Subject subject = Subject::particles;
   int axis = 1;
-  void add(const StatisticScene& s, const ParticleValues& p, std::span<double> sums) const {
-    sums[0] += s.mass * p.velocity[axis];
-  }
+  void add(const StatisticScene&, const ParticleValues& p, std::span<double> sums) const { sums[0] += p.mass * p.velocity[axis]; }
 };
 
 // Mean velocity of the particles in top-hat bins across the width: a slab |y − height| ≤ half_height, depth_low ≤ z ≤ depth_high.
@@ -174,6 +187,20 @@ struct MomentumBalance {
   static constexpr Subject subject = Subject::step;
   double value(const StepValues& step) const { return step.momentum_residual; }
 };
+struct MassEntered {
+  static constexpr const char* name = "mass_entered";
+  static constexpr const char* unit = "kg";
+  static constexpr const char* meaning = "mass of the particles that have entered since time 0";
+  static constexpr Subject subject = Subject::step;
+  double value(const StepValues& step) const { return step.mass_entered; }
+};
+struct MassLeft {
+  static constexpr const char* name = "mass_left";
+  static constexpr const char* unit = "kg";
+  static constexpr const char* meaning = "mass of the particles that have left since time 0";
+  static constexpr Subject subject = Subject::step;
+  double value(const StepValues& step) const { return step.mass_left; }
+};
 // A mean over time is that of each step's largest.
 struct MaxOverlap {
   static constexpr const char* name = "max_overlap";
@@ -185,7 +212,7 @@ struct MaxOverlap {
 };
 
 using Statistic = std::variant<KineticEnergy, BedHeight, PressureDrop, MassBalance, MomentumBalance, MaxOverlap, ParticleCount,
-                               VoidFractionProfile, VelocityProfile, ParticleMomentum>;
+                               VoidFractionProfile, VelocityProfile, ParticleMomentum, ParticleMass, MassEntered, MassLeft>;
 
 // What a statistic leaves out when it is a series of one sum.
 template <class Law>

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 #include <sstream>
 
 #include "base/stop.h"
+#include "particles/occupied.h"
 #include "particles/random.h"
 
 namespace bedflow {
@@ -13,112 +15,269 @@ namespace bedflow {
 namespace {
 
 constexpr int most_tries = 20000;  // for one sphere
+constexpr double closest_regions =
+    0.9;                             // spheres of two regions, in the sum of their radii: slight overlaps are preloaded contacts
+constexpr double round_off = 1e-12;  // of a division: spheres that just touch are allowed
 
-// Spheres placed so far, in cells at least a diameter wide.
-class Occupied {
- public:
-  Occupied(Vec3 low, Vec3 high, double diameter, std::int64_t count) : low_(low), diameter_(diameter) {
-    const Vec3 extent = high - low;
-    double edge = diameter;
-    const auto cells = [&](int d) { return std::floor(extent[d] / edge) + 1; };
-    while (cells(0) * cells(1) * cells(2) > 64 + 8 * static_cast<double>(count)) edge *= 1.25;
-    for (int d = 0; d < 3; ++d) cells_[d] = static_cast<int>(cells(d));
-    edge_ = edge;
-    head_.assign(static_cast<std::size_t>(cells_[0]) * cells_[1] * cells_[2], -1);
-  }
-  bool add_if_free(Vec3 x) {
-    Int3 cell{};
-    for (int d = 0; d < 3; ++d) cell[d] = std::min(static_cast<int>((x[d] - low_[d]) / edge_), cells_[d] - 1);
-    for (int k = std::max(cell[2] - 1, 0); k <= std::min(cell[2] + 1, cells_[2] - 1); ++k)
-      for (int j = std::max(cell[1] - 1, 0); j <= std::min(cell[1] + 1, cells_[1] - 1); ++j)
-        for (int i = std::max(cell[0] - 1, 0); i <= std::min(cell[0] + 1, cells_[0] - 1); ++i)
-          for (std::int64_t n = head_[index(i, j, k)]; n >= 0; n = next_[n])
-            if (dot(x - centres_[n], x - centres_[n]) < diameter_ * diameter_) return false;
-    std::int64_t& head = head_[index(cell[0], cell[1], cell[2])];
-    next_.push_back(head);
-    head = static_cast<std::int64_t>(centres_.size());
-    centres_.push_back(x);
-    return true;
-  }
-  const std::vector<Vec3>& centres() const { return centres_; }
+double volume(double diameter) {
+  return std::numbers::pi / 6 * diameter * diameter * diameter;
+}
+double mean_volume(const SeedKind& kind) {
+  return std::numbers::pi / 6 * kind.sizes.moment(3);
+}
+double box_volume(Vec3 low, Vec3 high) {
+  const Vec3 edges = high - low;
+  return edges.x * edges.y * edges.z;
+}
 
- private:
-  std::size_t index(int i, int j, int k) const {
-    return static_cast<std::size_t>(i) + static_cast<std::size_t>(cells_[0]) * (j + static_cast<std::size_t>(cells_[1]) * k);
-  }
-  Vec3 low_;
-  double diameter_, edge_ = 0;
-  Int3 cells_{};
-  std::vector<std::int64_t> head_, next_;
-  std::vector<Vec3> centres_;
-};
+std::vector<double> shares_of(const std::vector<SeedKind>& kinds, const std::vector<double>& shares) {
+  return shares.empty() ? std::vector<double>(kinds.size(), 1.0 / static_cast<double>(kinds.size())) : shares;
+}
 
-[[noreturn]] void refuse_region(const RandomSeeds& seeds, double radius, std::int64_t placed) {
+// Volume of the solids of each kind, m³.
+std::vector<double> volumes_wanted(const std::vector<SeedKind>& kinds, const RandomSeeds& seeds) {
+  std::vector<double> volumes = shares_of(kinds, seeds.shares);
+  for (std::size_t k = 0; k < kinds.size(); ++k) volumes[k] *= mean_volume(kinds[k]);
+  const double all = std::accumulate(volumes.begin(), volumes.end(), 0.0);
+  for (double& v : volumes) v *= seeds.solids_fraction * box_volume(seeds.low, seeds.high) / all;
+  return volumes;
+}
+
+// ---------------------------------------------------------------------------------------------------- kinds and diameters
+
+double draw(const SizeDistribution& sizes, Random& random) {
+  return sizes.constant() ? sizes.largest() : sizes.quantile(random.uniform());
+}
+
+// Whole numbers of each kind that add up to the count, by the largest remainders.
+std::vector<std::int64_t> quotas(const std::vector<double>& shares, std::int64_t count) {
+  std::vector<std::int64_t> result(shares.size());
+  std::vector<std::pair<double, std::size_t>> remainders;
+  std::int64_t left = count;
+  for (std::size_t k = 0; k < shares.size(); ++k) {
+    const double exact = shares[k] * static_cast<double>(count);
+    result[k] = static_cast<std::int64_t>(std::floor(exact));
+    left -= result[k];
+    remainders.emplace_back(static_cast<double>(result[k]) - exact, k);
+  }
+  std::ranges::sort(remainders);
+  for (std::size_t r = 0; left > 0; r = (r + 1) % remainders.size(), --left) ++result[remainders[r].second];
+  return result;
+}
+
+using Spheres = std::vector<PlacedSphere>;  // of kinds and diameters that are drawn, without a place
+
+Spheres draw_count(const std::vector<SeedKind>& kinds, const std::vector<double>& shares, std::int64_t count, Random& random) {
+  Spheres spheres;
+  const std::vector<std::int64_t> of_kind = quotas(shares_of(kinds, shares), count);
+  for (std::size_t k = 0; k < kinds.size(); ++k)
+    for (std::int64_t n = 0; n < of_kind[k]; ++n)
+      spheres.push_back({.kind = static_cast<int>(k), .diameter = draw(kinds[k].sizes, random)});
+  return spheres;
+}
+
+Spheres draw_volume(const std::vector<SeedKind>& kinds, const RandomSeeds& seeds, Random& random) {
+  Spheres spheres;
+  const std::vector<double> wanted = volumes_wanted(kinds, seeds);
+  for (std::size_t k = 0; k < kinds.size(); ++k)
+    for (double filled = 0;;) {
+      const double diameter = draw(kinds[k].sizes, random);
+      if (filled + volume(diameter) / 2 > wanted[k]) break;
+      filled += volume(diameter);
+      spheres.push_back({.kind = static_cast<int>(k), .diameter = diameter});
+    }
+  return spheres;
+}
+
+// ---------------------------------------------------------------------------------------------------- random regions
+
+[[noreturn]] void refuse_region(const std::string& path, const RandomSeeds& seeds, const Spheres& spheres, std::size_t placed) {
   const Vec3 edges = seeds.high - seeds.low;
-  const double solid = 4 * std::numbers::pi / 3 * radius * radius * radius * static_cast<double>(seeds.count);
+  double solid = 0;
+  for (const PlacedSphere& sphere : spheres) solid += volume(sphere.diameter);
   std::ostringstream message;
-  message << "particles.random.region: " << seeds.count << " spheres of " << 2 * radius << " m do not fit at random into "
-          << edges.x << " x " << edges.y << " x " << edges.z << " m; they are " << solid / (edges.x * edges.y * edges.z)
+  message << path << ".random.region: " << spheres.size() << " spheres of ";
+  if (spheres.back().diameter < spheres.front().diameter) message << spheres.back().diameter << " to ";
+  message << spheres.front().diameter << " m do not fit at random into " << edges.x << " x " << edges.y << " x " << edges.z
+          << " m; they are " << solid / box_volume(seeds.low, seeds.high)
           << " of it, and random places without overlap are found to about 0.3 (" << placed
-          << " found a place); enlarge the region, or lower particles.random.count";
+          << " found a place); enlarge the region, or lower " << path << ".random."
+          << (seeds.solids_fraction > 0 ? "solids_fraction" : "count");
   throw Stop(Reason::invalid_case, message.str());
 }
 
-void keep_if_owned(const Decomposition& decomposition, ParticleStore& store, std::int64_t id, const PlacedSphere& sphere) {
-  if (decomposition.owner(sphere.position) != decomposition.comm().rank()) return;
-  store.add(id, sphere.position, sphere.velocity, sphere.spin);
+Spheres random_spheres(const std::vector<SeedKind>& kinds, const std::string& path, const RandomSeeds& seeds,
+                       Occupied& occupied) {
+  Random random(seeds.seed);
+  Spheres spheres =
+      seeds.solids_fraction > 0 ? draw_volume(kinds, seeds, random) : draw_count(kinds, seeds.shares, seeds.count, random);
+  std::ranges::stable_sort(spheres, std::ranges::greater{}, &PlacedSphere::diameter);
+  for (std::size_t n = 0; n < spheres.size(); ++n) {
+    const double radius = spheres[n].diameter / 2;
+    const Vec3 margin{radius, radius, radius}, low = seeds.low + margin, high = seeds.high - margin;
+    Occupied::Sphere sphere{{}, radius};
+    int tries = 0;
+    do {
+      if (tries++ == most_tries || low.x > high.x || low.y > high.y || low.z > high.z) refuse_region(path, seeds, spheres, n);
+      sphere.centre = random.inside(low, high);
+    } while (!occupied.is_free(sphere));
+    occupied.add(sphere);
+    spheres[n].position = sphere.centre;
+  }
+  for (PlacedSphere& sphere : spheres)
+    if (seeds.velocity_deviation > 0)
+      for (int d = 0; d < 3; ++d) sphere.velocity[d] = seeds.velocity_deviation * random.gaussian();
+  return spheres;
+}
+
+// ---------------------------------------------------------------------------------------------------- told regions
+
+Spheres lattice_spheres(const std::vector<SeedKind>& kinds, const std::string& path, const LatticeSeeds& seeds) {
+  Random random(seeds.seed);
+  const Int3 count = seeds.count;
+  Spheres spheres = draw_count(kinds, seeds.shares, static_cast<std::int64_t>(count[0]) * count[1] * count[2], random);
+  double largest = 0;
+  for (const PlacedSphere& sphere : spheres) largest = std::max(largest, sphere.diameter);
+  Vec3 spacing;
+  for (int d = 0; d < 3; ++d) {
+    spacing[d] = (seeds.high[d] - seeds.low[d]) / count[d];
+    if (count[d] > 0 && spacing[d] < largest * (1 - round_off)) {
+      std::ostringstream message;
+      message << path << ".lattice.count."
+              << "xyz"[d] << ": " << count[d] << " particles in " << seeds.high[d] - seeds.low[d] << " m stand " << spacing[d]
+              << " m apart, less than the largest diameter " << largest << " m; enlarge " << path
+              << ".lattice.region or lower the count";
+      throw Stop(Reason::invalid_case, message.str());
+    }
+  }
+  const bool alike = std::ranges::all_of(
+      spheres, [&](const PlacedSphere& s) { return s.kind == spheres.front().kind && s.diameter == spheres.front().diameter; });
+  for (std::size_t n = spheres.size(); n > 1 && !alike; --n)  // Fisher & Yates
+    std::swap(spheres[n - 1], spheres[static_cast<std::size_t>(random.uniform() * static_cast<double>(n))]);
+  std::size_t n = 0;
+  for (int k = 0; k < count[2]; ++k)
+    for (int j = 0; j < count[1]; ++j)
+      for (int i = 0; i < count[0]; ++i)
+        spheres[n++].position = seeds.low + Vec3{(i + 0.5) * spacing.x, (j + 0.5) * spacing.y, (k + 0.5) * spacing.z};
+  return spheres;
+}
+
+Spheres placed_spheres(const std::vector<SeedKind>& kinds, const PlacedSeeds& seeds) {
+  Random random(0);
+  Spheres spheres = seeds;
+  for (PlacedSphere& sphere : spheres)
+    if (sphere.diameter == 0) sphere.diameter = draw(kinds[sphere.kind].sizes, random);
+  return spheres;
+}
+
+void add_told(const std::string& path, const Spheres& spheres, Occupied& occupied) {
+  for (const PlacedSphere& sphere : spheres) {
+    const Occupied::Sphere here{sphere.position, sphere.diameter / 2};
+    const Occupied::Sphere* other = occupied.find_overlap(here, closest_regions);
+    if (!other) continue;
+    std::ostringstream message;
+    message << path << ": its particle at (" << here.centre.x << ", " << here.centre.y << ", " << here.centre.z
+            << ") m overlaps that of another region at (" << other->centre.x << ", " << other->centre.y << ", " << other->centre.z
+            << ") m by more than a tenth of their sizes; move one of the regions";
+    throw Stop(Reason::invalid_case, message.str());
+  }
+  for (const PlacedSphere& sphere : spheres) occupied.add({sphere.position, sphere.diameter / 2});
+}
+
+Occupied empty_room(const std::vector<SeedKind>& kinds, const std::vector<SeedRegion>& regions) {
+  double largest = 0;
+  for (const SeedKind& kind : kinds) largest = std::max(largest, kind.sizes.largest());
+  std::int64_t count = 0;
+  for (const SeedRegion& region : regions) count += expected_count(kinds, region);
+  const auto [low, high] = seed_extent(regions);
+  return {low, high, largest, count};
+}
+
+}  // namespace
+
+std::vector<double> number_shares(const std::vector<SeedKind>& kinds, std::vector<double> shares, Basis basis) {
+  if (basis == Basis::mass)
+    for (std::size_t k = 0; k < kinds.size(); ++k) shares[k] /= kinds[k].density * mean_volume(kinds[k]);
+  const double sum = std::accumulate(shares.begin(), shares.end(), 0.0);
+  for (double& share : shares) share /= sum;
+  return shares;
+}
+
+std::int64_t expected_count(const std::vector<SeedKind>& kinds, const SeedRegion& region) {
+  if (const auto* placed = std::get_if<PlacedSeeds>(&region.seeds)) return static_cast<std::int64_t>(placed->size());
+  if (const auto* lattice = std::get_if<LatticeSeeds>(&region.seeds))
+    return static_cast<std::int64_t>(lattice->count[0]) * lattice->count[1] * lattice->count[2];
+  const auto& seeds = std::get<RandomSeeds>(region.seeds);
+  if (!(seeds.solids_fraction > 0)) return seeds.count;
+  const std::vector<double> volumes = volumes_wanted(kinds, seeds);
+  std::int64_t count = 0;
+  for (std::size_t k = 0; k < kinds.size(); ++k) count += std::llround(volumes[k] / mean_volume(kinds[k]));
+  return count;
+}
+
+SeedExtent seed_extent(const std::vector<SeedRegion>& regions) {
+  constexpr double far = std::numeric_limits<double>::max();
+  SeedExtent box{{far, far, far}, {-far, -far, -far}};
+  const auto include = [&](Vec3 x) {
+    for (int d = 0; d < 3; ++d) box.low[d] = std::min(box.low[d], x[d]), box.high[d] = std::max(box.high[d], x[d]);
+  };
+  for (const SeedRegion& region : regions) {
+    std::visit(
+        [&]<class Seeds>(const Seeds& seeds) {
+          if constexpr (std::is_same_v<Seeds, PlacedSeeds>) {
+            for (const PlacedSphere& sphere : seeds) include(sphere.position);
+          } else {
+            include(seeds.low), include(seeds.high);
+          }
+        },
+        region.seeds);
+  }
+  return box.low.x <= box.high.x ? box : SeedExtent{};
+}
+
+std::vector<PlacedSphere> seed_spheres(const std::vector<SeedKind>& kinds, const std::vector<SeedRegion>& regions) {
+  Spheres all;
+  Occupied occupied = empty_room(kinds, regions);
+  const auto append = [&](const Spheres& spheres) { all.insert(all.end(), spheres.begin(), spheres.end()); };
+  for (const SeedRegion& region : regions) {
+    if (std::holds_alternative<RandomSeeds>(region.seeds)) continue;
+    const auto* placed = std::get_if<PlacedSeeds>(&region.seeds);
+    const Spheres spheres =
+        placed ? placed_spheres(kinds, *placed) : lattice_spheres(kinds, region.path, std::get<LatticeSeeds>(region.seeds));
+    if (regions.size() > 1) add_told(region.path, spheres, occupied);
+    append(spheres);
+  }
+  for (const SeedRegion& region : regions)
+    if (const auto* seeds = std::get_if<RandomSeeds>(&region.seeds)) append(random_spheres(kinds, region.path, *seeds, occupied));
+  return all;
+}
+
+ParticleStore keep_owned(const Decomposition& decomposition, const std::vector<PlacedSphere>& spheres) {
+  ParticleStore store;
+  for (std::size_t i = 0; i < spheres.size(); ++i)
+    if (decomposition.owner(spheres[i].position) == decomposition.comm().rank())
+      store.add(static_cast<std::int64_t>(i), spheres[i].position, spheres[i].velocity, spheres[i].spin);
+  return store;
+}
+
+namespace {
+
+ParticleStore seed_one(const Decomposition& decomposition, double radius, const SeedRegion& region) {
+  return keep_owned(decomposition, seed_spheres({{"particles", SizeDistribution(ConstantSize{2 * radius}), 1}}, {region}));
 }
 
 }  // namespace
 
 ParticleStore seed_random(const Decomposition& decomposition, double radius, const RandomSeeds& seeds) {
-  const Vec3 margin{radius, radius, radius}, low = seeds.low + margin, high = seeds.high - margin;
-  for (int d = 0; d < 3; ++d)
-    if (seeds.count > 0 && low[d] > high[d]) refuse_region(seeds, radius, 0);
-  Random random(seeds.seed);
-  Occupied occupied(low, high, 2 * radius, seeds.count);
-  for (std::int64_t id = 0; id < seeds.count; ++id) {
-    int tries = 0;
-    while (!occupied.add_if_free(random.inside(low, high)))
-      if (++tries == most_tries) refuse_region(seeds, radius, id);
-  }
-  ParticleStore store;
-  for (std::int64_t id = 0; id < seeds.count; ++id) {
-    Vec3 velocity;
-    if (seeds.velocity_deviation > 0)
-      for (int d = 0; d < 3; ++d) velocity[d] = seeds.velocity_deviation * random.gaussian();
-    keep_if_owned(decomposition, store, id, {occupied.centres()[id], velocity, {}});
-  }
-  return store;
+  return seed_one(decomposition, radius, {"particles", seeds});
 }
 
 ParticleStore seed_lattice(const Decomposition& decomposition, double radius, Int3 count, Vec3 low, Vec3 high) {
-  Vec3 spacing;
-  for (int d = 0; d < 3; ++d) {
-    spacing[d] = (high[d] - low[d]) / count[d];
-    if (count[d] > 0 &&
-        spacing[d] < 2 * radius * (1 - 1e-12)) {  // spheres that just touch are allowed: round-off of the division
-      std::ostringstream message;
-      message << "particles.lattice.count."
-              << "xyz"[d] << ": " << count[d] << " particles in " << high[d] - low[d] << " m stand " << spacing[d]
-              << " m apart, less than their diameter " << 2 * radius << " m; enlarge particles.lattice.region or lower the count";
-      throw Stop(Reason::invalid_case, message.str());
-    }
-  }
-  ParticleStore store;
-  std::int64_t id = 0;
-  for (int k = 0; k < count[2]; ++k)
-    for (int j = 0; j < count[1]; ++j)
-      for (int i = 0; i < count[0]; ++i)
-        keep_if_owned(decomposition, store, id++,
-                      {low + Vec3{(i + 0.5) * spacing.x, (j + 0.5) * spacing.y, (k + 0.5) * spacing.z}, {}, {}});
-  return store;
+  return seed_one(decomposition, radius, {"particles", LatticeSeeds{count, low, high}});
 }
 
 ParticleStore seed_placed(const Decomposition& decomposition, const std::vector<PlacedSphere>& spheres) {
-  ParticleStore store;
-  for (std::size_t i = 0; i < spheres.size(); ++i) keep_if_owned(decomposition, store, static_cast<std::int64_t>(i), spheres[i]);
-  return store;
+  return seed_one(decomposition, 1, {"particles", spheres});
 }
 
 }  // namespace bedflow

@@ -17,7 +17,7 @@ template <class Law>
 void sum_over_particles(const Law& law, const StatisticScene& scene, const Observation& now, std::span<double> sums) {
   const ParticleStore& particles = *now.particles;
   for (std::size_t i = 0; i < particles.owned; ++i) {
-    law.add(scene, {particles.position(i), particles.velocity(i), particles.spin(i)}, sums);
+    law.add(scene, {particles.position(i), particles.velocity(i), particles.spin(i), now.radius, now.mass, 0}, sums);
   }
 }
 
@@ -49,7 +49,7 @@ bool peaks(const Statistic& statistic) {
 }  // namespace
 
 Monitors::Monitors(const Decomposition& decomposition, std::vector<MonitorSetup> setups, StatisticsSink sink)
-    : scene_{decomposition.size(), decomposition.global_cells(), 0, 0}, sink_(std::move(sink)) {
+    : scene_{decomposition.size(), decomposition.global_cells()}, sink_(std::move(sink)) {
   for (MonitorSetup& setup : setups) {
     const std::size_t places = std::visit(
         [&]<class Law>(const Law& law) { return has_places<Law> ? places_of(law, scene_).size() : 1; }, setup.statistic);
@@ -115,7 +115,7 @@ void Monitors::evaluate(const Observation& now, double max_overlap, Monitor& m) 
   std::visit(
       [&]<class Law>(const Law& law) {
         if constexpr (Law::subject == Subject::step) {
-          m.values[0] = law.value({max_overlap, now.mass_residual, now.momentum_residual});
+          m.values[0] = law.value({max_overlap, now.mass_residual, now.momentum_residual, now.mass_entered, now.mass_left});
         } else if (present(Law::subject, now)) {
           values_from(law, scene_, std::span(sums_).subspan(m.first_sum, sums_of(law, scene_)), m.values);
         } else {
@@ -139,8 +139,6 @@ void Monitors::report(std::size_t monitor, std::uint64_t step, double time, doub
 }
 
 void Monitors::observe(const Observation& now, std::uint64_t step, double time, double dt, bool last) {
-  scene_.radius = now.radius;
-  scene_.mass = now.mass;
   sums_.assign(find_due(time, dt, last), 0);
   gather(now);
   const Comm& comm = now.decomposition.comm();

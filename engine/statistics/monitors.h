@@ -39,6 +39,7 @@ struct Observation {
   double max_overlap = 0;                    // in the step, over the diameter, this rank
   double mass_residual = 0;                  // in the step, the same on every rank
   double momentum_residual = 0;              // in the step, the same on every rank
+  double mass_entered = 0, mass_left = 0;    // particles since time 0, kg, the same on every rank
 };
 
 struct SampleOut {

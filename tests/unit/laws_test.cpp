@@ -41,6 +41,7 @@ TEST(Laws, OfTheSchemaAreThoseOfTheCode) {
   EXPECT_EQ(arms(v1::Gas::descriptor(), "convection"), NamesOf<Convection>::get());
   EXPECT_EQ(arms(v1::Face::descriptor(), "condition"), NamesOf<Boundary>::get());
   EXPECT_EQ(arms(v1::Monitor::descriptor(), "quantity"), NamesOf<Statistic>::get());
+  EXPECT_EQ(arms(v1::ParticleType::descriptor(), "sizes"), NamesOf<SizeLaw>::get());
   EXPECT_EQ(arms(v1::Coupling::descriptor(), "kernel"), std::set<std::string>{Hat::name});
 }
 

@@ -110,5 +110,123 @@ TEST(Seeding, PlacedSpheresGoToTheirOwnersAsGiven) {
   }
 }
 
+// ---------------------------------------------------------------------------------------------------- kinds and sizes
+
+double sphere(double d) {
+  return 3.14159265358979 / 6 * d * d * d;
+}
+const std::vector<SeedKind> mixture{
+    {"sand", SizeDistribution(LogNormalSizes{0.8e-3, 0.3, 0.4e-3, 2e-3}), 2600},
+    {"pellets", SizeDistribution(ConstantSize{2e-3}), 900},
+};
+void expect_apart(const std::vector<PlacedSphere>& spheres) {
+  for (std::size_t i = 0; i < spheres.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j) {
+      EXPECT_GE(norm(spheres[i].position - spheres[j].position), (spheres[i].diameter + spheres[j].diameter) / 2 * (1 - 1e-15));
+    }
+}
+std::int64_t count_of(const std::vector<PlacedSphere>& spheres, int kind) {
+  return std::ranges::count(spheres, kind, &PlacedSphere::kind);
+}
+
+TEST(Seeding, SpheresOfDifferentSizesLieInTheRegionAndDoNotOverlap) {
+  RandomSeeds random = seeds;
+  random.shares = {0.8, 0.2};
+  const std::vector<PlacedSphere> spheres = seed_spheres(mixture, {{"particles", random}});
+  ASSERT_EQ(spheres.size(), 1500u);
+  expect_apart(spheres);
+  for (const PlacedSphere& s : spheres)
+    for (int d = 0; d < 3; ++d) {
+      EXPECT_GE(s.position[d], seeds.low[d] + s.diameter / 2);
+      EXPECT_LE(s.position[d], seeds.high[d] - s.diameter / 2);
+    }
+  EXPECT_EQ(count_of(spheres, 1), 300);  // shares are met to one particle
+}
+
+TEST(Seeding, SharesByMassAreMetByTheMassOfTheBed) {
+  RandomSeeds random = seeds;
+  random.shares = number_shares(mixture, {3, 1}, Basis::mass);
+  double mass[2]{}, largest = 0;
+  for (const PlacedSphere& s : seed_spheres(mixture, {{"particles", random}})) {
+    mass[s.kind] += mixture[s.kind].density * sphere(s.diameter);
+    largest = std::max(largest, mixture[s.kind].density * sphere(s.diameter));
+  }
+  // Four standard errors of the mass of n log-normal spheres: the squared cube has the relative variance m6/m3² − 1.
+  const SizeDistribution& sand = mixture[0].sizes;
+  const double n = 1500 * random.shares[0];
+  const double error = 4 * std::sqrt((sand.moment(6) / std::pow(sand.moment(3), 2) - 1) / n);
+  EXPECT_NEAR(mass[0] / mass[1], 3, 3 * error + 3 * largest / mass[1]);
+}
+
+TEST(Seeding, ASolidsFractionIsReachedToWithinHalfASphereOfEachKind) {
+  RandomSeeds random = seeds;
+  random.count = 0;
+  random.solids_fraction = 0.2;
+  random.shares = {0.9, 0.1};
+  const std::vector<PlacedSphere> spheres = seed_spheres(mixture, {{"particles", random}});
+  double solids = 0;
+  for (const PlacedSphere& s : spheres) solids += sphere(s.diameter);
+  const double box_volume = 0.02 * 0.026 * 0.01;
+  EXPECT_NEAR(solids / box_volume, 0.2, 2 * sphere(2e-3) / 2 / box_volume);
+  EXPECT_NEAR(static_cast<double>(expected_count(mixture, {"particles", random})), static_cast<double>(spheres.size()),
+              0.2 * static_cast<double>(spheres.size()));
+}
+
+// Two sizes 1:5, the small ones between the large ones: every overlap is found whatever the ratio.
+TEST(Seeding, SizesOneToFiveDoNotOverlap) {
+  const std::vector<SeedKind> kinds{{"large", SizeDistribution(ConstantSize{3e-3}), 1},
+                                    {"small", SizeDistribution(ConstantSize{0.6e-3}), 1}};
+  RandomSeeds random{0, 7, {0, 0, 0}, {0.02, 0.02, 0.01}};
+  random.solids_fraction = 0.34;
+  random.shares = number_shares(kinds, {1, 1}, Basis::mass);
+  const std::vector<PlacedSphere> spheres = seed_spheres(kinds, {{"particles", random}});
+  EXPECT_EQ(count_of(spheres, 0), std::lround(0.17 * 4e-6 / sphere(3e-3)));
+  EXPECT_EQ(count_of(spheres, 1), std::lround(0.17 * 4e-6 / sphere(0.6e-3)));
+  expect_apart(spheres);
+}
+
+TEST(Seeding, RandomRegionsKeepClearOfLatticesPlacedSpheresAndEachOther) {
+  RandomSeeds random = seeds;
+  random.count = 500;
+  random.shares = {1, 0};
+  RandomSeeds another = random;
+  another.seed = 5;
+  LatticeSeeds lattice{{4, 4, 2}, {0, 0.01, 0}, {0.02, 0.02, 0.01}};
+  lattice.shares = {0.5, 0.5};
+  const std::vector<SeedRegion> regions{
+      {"a", random}, {"b", lattice}, {"c", PlacedSeeds{{.position = {0.01, 0.005, 0.005}, .kind = 1}}}, {"d", another}};
+  const std::vector<PlacedSphere> spheres = seed_spheres(mixture, regions);
+  ASSERT_EQ(spheres.size(), 500u + 32 + 1 + 500);
+  expect_apart(spheres);
+  EXPECT_EQ(count_of(spheres, 1), 16 + 1);
+  EXPECT_EQ(spheres[32].diameter, 2e-3);  // a placed one without a diameter has that of its kind
+}
+
+TEST(Seeding, ALatticeMixesItsKinds) {
+  LatticeSeeds lattice{{10, 10, 1}, {0, 0, 0}, {0.03, 0.03, 0.003}};
+  lattice.shares = {0.5, 0.5};
+  const std::vector<PlacedSphere> spheres = seed_spheres(mixture, {{"particles", lattice}});
+  int changes = 0;
+  for (std::size_t i = 1; i < spheres.size(); ++i) changes += spheres[i].kind != spheres[i - 1].kind;
+  EXPECT_EQ(count_of(spheres, 0), 50);
+  EXPECT_NEAR(changes, 50, 4 * 5);  // four standard deviations of runs in a fair shuffle
+}
+
+TEST(Seeding, RegionsThatOverlapAreRefusedByName) {
+  const SeedRegion lattice{"particles.composed.regions[0]", LatticeSeeds{{2, 2, 2}, {0, 0, 0}, {0.01, 0.01, 0.01}, 0, {0, 1}}};
+  const auto placed = [](double x) {
+    return SeedRegion{"particles.composed.regions[1]", PlacedSeeds{{.position = {x, 0.0025, 0.0025}, .kind = 1}}};
+  };
+  EXPECT_NO_THROW(seed_spheres(mixture, {lattice, placed(0.0044)}));  // 0.95 of a diameter away: a preloaded contact
+  try {
+    seed_spheres(mixture, {lattice, placed(0.0042)});
+    FAIL() << "nothing was refused";
+  } catch (const Stop& stop) {
+    EXPECT_EQ(stop.reason, Reason::invalid_case);
+    EXPECT_NE(std::string(stop.what()).find("particles.composed.regions[1]: its particle at (0.0042"), std::string::npos)
+        << stop.what();
+  }
+}
+
 }  // namespace
 }  // namespace bedflow
