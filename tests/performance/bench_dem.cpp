@@ -1,88 +1,121 @@
-// ns per particle and sub-step of the whole particle side: contacts, walls, integration, pair list.
+// µs per particle and sub-step of the whole particle side: contacts, walls, integration, pair list; and bytes per particle.
 //
-// The bed: 24 750 spheres of 2.49 mm (Goldschmidt), τ/20, in a box of 150 × 450 × 15 mm with six walls. Settled: at rest under
-// its weight. Agitated: shaken 5 mm at 15 Hz, which forces rebuilds of the list.
+// settled: at rest under its weight. agitated: the settled bed's first period of shaking, pressed together and then thrown up.
+// million: 42 beds side by side, settled. Each with its contacts per particle, and with what one core could do at best.
+#include <unistd.h>
+
 #include <benchmark/benchmark.h>
 
-#include <numbers>
+#include <algorithm>
+#include <fstream>
+#include <string>
 
-#include "parallel/comm.h"
-#include "support/dem_scene.h"
+#include "beds.h"
+#include "hardware.h"
 
 namespace bedflow {
 namespace {
 
-constexpr std::int64_t count = 24750;
-constexpr Vec3 box{0.15, 0.45, 0.015};
-constexpr double dt = 1e-5;
+constexpr int gas_step = 20;  // sub-steps
 
-Spheres goldschmidt() {
-  Spheres spheres;
-  spheres.diameter = 2.49e-3;
-  spheres.density = 2526;
-  spheres.stiffness = 2519;
-  spheres.gravity = {0, -9.81, 0};
-  spheres.skin = 0.1 * spheres.diameter;
-  return spheres;
-}
+template <class Law>
+class MovingBed {
+ public:
+  MovingBed(const Bed& bed, bool shaken) : shaken_(shaken), scene_(Comm::self(), bed.box, bed_spheres(), {8, 8, 8}, shaken) {
+    scene_.place(bed.spheres);
+  }
+  void advance() {
+    std::vector<Vec3>& push = scene_.dem.particles().gas_force;
+    if (shaken_) std::fill(push.begin(), push.end(), Vec3{0, bed_spheres().mass() * shaking(time_), 0});
+    scene_.advance(gas_step, bed_substep);
+    time_ += gas_step * bed_substep;
+  }
+  const Dem& dem() const { return scene_.dem; }
+  double count() const { return static_cast<double>(scene_.dem.particles().owned); }
+  double contacts_per_particle() const { return 2.0 * static_cast<double>(scene_.dem.contacts()) / count(); }
 
-// Falls under three times its weight, nearly without rebound, and then comes to rest under its own.
-ParticleStore settled_bed() {
-  Spheres heavy = goldschmidt(), dull = goldschmidt();
-  heavy.gravity.y *= 3;
-  heavy.restitution = dull.restitution = 0.1;
-  Scene<Coulomb> falling(Comm::self(), box, heavy), resting(Comm::self(), box, dull);
-  falling.seed({count, 1, {0, 0, 0}, {box.x, 0.33, box.z}, 0});
-  falling.advance(12000, dt);
-  resting.dem.restore(falling.dem.particles(), {}, {}, {});
-  resting.advance(15000, dt);
-  return resting.dem.particles();
+ private:
+  bool shaken_;
+  double time_ = 0;
+  Scene<Law> scene_;
+};
+
+// Least time of a particle and sub-step, µs. Two passes, contacts and motion, stream the row, the third component of ω, force
+// and torque of a particle to and fro, the second reads its place at the last rebuild; its pairs, and the ξ of its contacts, are
+// read once. Arithmetic as the equations of contact_sweep.h, the laws and integrate.h have it.
+struct Bound {
+  double memory, arithmetic;
+};
+template <class Law>
+Bound bound(double particles, double pairs, double contacts) {
+  const double row = 64 + 8, forces = Law::rotation ? 48 : 24, history = Law::history ? 24 : 0;
+  const double bytes = 2 * (2 * row + 2 * forces) + 24 + pairs * (8 + 2 * history);
+  const double resident = row + forces + 24 + pairs * (8 + history);
+  const double flops = 8 * pairs + contacts * (32 + (Law::rotation ? 48 : 0) + (Law::history ? 60 : 0)) + 24;
+  const double roots = contacts * (2 + (Law::rotation ? 2 : 0) + (Law::history ? 3 : 0));
+  return {bytes / triad_bandwidth(static_cast<std::size_t>(particles * resident)) * 1e6,
+          (flops / peak_flops() + roots / peak_roots()) * 1e6};
 }
 
 template <class Law>
-void sub_steps(benchmark::State& state, const ParticleStore& bed, bool agitated) {
-  const Spheres spheres = goldschmidt();
-  Scene<Law> scene(Comm::self(), box, spheres, {8, 8, 8}, agitated);
-  scene.dem.restore(bed, {}, {}, {});
-  double time = 0;
-  constexpr int substeps = 20;
-  const auto gas_step = [&] {
-    if (agitated) {
-      const double push = spheres.mass() * 44.4 * std::sin(2 * std::numbers::pi * 15 * time);
-      std::fill(scene.dem.particles().gas_force.begin(), scene.dem.particles().gas_force.end(), Vec3{0, push, 0});
-    }
-    scene.advance(substeps, dt);
-    time += substeps * dt;
-  };
-  for (int i = 0; i < (agitated ? 200 : 10); ++i) gas_step();
-  const std::int64_t before = scene.dem.rebuilds();
-  double done = 0;
+void sub_steps(benchmark::State& state, int along_x, int along_z, bool shaken) {
+  const Bed bed = settled_bed(along_x, along_z);
+  MovingBed<Law> moving(bed, shaken);
+  for (int i = 0; i < (shaken ? 0 : 10); ++i) moving.advance();
+  const std::int64_t before = moving.dem().rebuilds();
+  double done = 0, contacts = 0;
   for (auto _ : state) {
-    gas_step();
-    done += substeps * static_cast<double>(count);
+    moving.advance();
+    ++done;
+    contacts += moving.contacts_per_particle();
   }
-  if (scene.dem.failure()) state.SkipWithError(scene.dem.failure().message.c_str());
+  if (moving.dem().failure()) state.SkipWithError(moving.dem().failure().message.c_str());
+  contacts /= done;
+  const Bound least = bound<Law>(moving.count(), 3.8, contacts / 2);
   state.SetLabel("us per particle and sub-step");
-  state.counters["figure"] = benchmark::Counter(done * 1e-6, benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
-  // Streamed once in each of two passes from beyond the caches (14 GB/s): x, v, ω, force, torque, place; pairs and ξ beside them.
-  const double bytes = 2 * 5 * 24 + 24 + 4 * (8 + (Law::history ? 48 : 0));
-  state.counters["roofline"] = bytes / 14e9 * 1e6;
-  state.counters["contacts_per_particle"] = 2.0 * static_cast<double>(scene.dem.contacts()) / static_cast<double>(count);
+  state.counters["figure"] =
+      benchmark::Counter(done * gas_step * moving.count() * 1e-6, benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+  state.counters["memory_bound"] = least.memory;
+  state.counters["arithmetic_bound"] = least.arithmetic;
+  state.counters["bed_height_mm"] = 1e3 * bed.height();
+  state.counters["contacts_per_particle"] = contacts;
   state.counters["substeps_per_rebuild"] =
-      done / static_cast<double>(count) / static_cast<double>(std::max<std::int64_t>(scene.dem.rebuilds() - before, 1));
-  for (const Phase phase : {Phase::pairs, Phase::contacts, Phase::walls, Phase::integration, Phase::migration})
-    state.counters[std::string(phase_names[static_cast<int>(phase)]) + "_share"] =
-        scene.timer[phase].seconds / scene.timer.seconds();
+      done * gas_step / static_cast<double>(std::max<std::int64_t>(moving.dem().rebuilds() - before, 1));
+}
+
+double resident_bytes() {
+  std::ifstream file("/proc/self/statm");
+  double all = 0, resident = 0;
+  file >> all >> resident;
+  return resident * static_cast<double>(sysconf(_SC_PAGESIZE));
+}
+
+// What 8 beds, with their lists and after a rebuild, add to the resident set of a process that has done nothing else.
+template <class Law>
+void memory(benchmark::State& state) {
+  for (auto _ : state) {
+    const std::filesystem::path file = settled_bed_file(4, 2);
+    const double before = resident_bytes();
+    MovingBed<Law> moving(settled_bed(4, 2), true);
+    while (moving.dem().rebuilds() == 0) moving.advance();
+    state.counters["figure"] = (resident_bytes() - before) / moving.count();
+  }
+  state.SetLabel("bytes per particle");
 }
 
 template <class Law>
-void add(const ParticleStore& bed) {
-  for (const bool agitated : {false, true}) {
-    const std::string name = std::string(Law::name) + (agitated ? "/agitated" : "/settled");
-    benchmark::RegisterBenchmark(name.c_str(), [&bed, agitated](benchmark::State& state) {
-      sub_steps<Law>(state, bed, agitated);
-    })->Unit(benchmark::kMillisecond);
-  }
+void add() {
+  const std::string law = Law::name;
+  const auto sweep = [&](const char* name, int iterations, int along_x, int along_z, bool shaken) {
+    benchmark::RegisterBenchmark((law + name).c_str(),
+                                 [=](benchmark::State& state) { sub_steps<Law>(state, along_x, along_z, shaken); })
+        ->Iterations(iterations)
+        ->Unit(benchmark::kMillisecond);
+  };
+  sweep("/settled", 50, 1, 1, false);
+  sweep("/agitated", static_cast<int>(shaking_period / (gas_step * bed_substep)), 1, 1, true);
+  sweep("/million", 5, 6, 7, false);
+  benchmark::RegisterBenchmark((law + "/memory").c_str(), memory<Law>)->Iterations(1);
 }
 
 }  // namespace
@@ -91,9 +124,8 @@ void add(const ParticleStore& bed) {
 int main(int argc, char** argv) {
   const bedflow::MpiSession session(&argc, &argv);
   benchmark::Initialize(&argc, argv);
-  const bedflow::ParticleStore bed = bedflow::settled_bed();
-  bedflow::add<bedflow::Frictionless>(bed);
-  bedflow::add<bedflow::Coulomb>(bed);
-  bedflow::add<bedflow::TangentialSpring>(bed);
+  bedflow::add<bedflow::Frictionless>();
+  bedflow::add<bedflow::Coulomb>();
+  bedflow::add<bedflow::TangentialSpring>();
   benchmark::RunSpecifiedBenchmarks();
 }

@@ -1,24 +1,70 @@
-"""The lines of deploy/bench.sh: a figure above its target, or none at all, is never called met."""
+"""The lines of deploy/bench.sh: a figure on the wrong side of its target, or none at all, is never called met."""
 import pathlib
 import sys
+import tempfile
 import unittest
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 import figures  # noqa: E402
+import measuring  # noqa: E402
+import peers  # noqa: E402
+from measuring import Baseline, Figure  # noqa: E402
+
+NO_BASELINE = Baseline(pathlib.Path("/nowhere"))
+
+
+def line(name, value, baseline=NO_BASELINE, notes=()):
+    return measuring.line(Figure(name, value, "s", list(notes)), {"time": ("<=", 2), "speed": (">=", 3)}, baseline)
 
 
 class Figures(unittest.TestCase):
-    targets = {"a": ("s", 2)}
-
-    def test_a_figure_is_met_up_to_its_target_and_short_above(self):
-        self.assertEqual(figures.line("a", 2, "s", self.targets), ("a, 2, s, <= 2, met", False))
-        self.assertEqual(figures.line("a", 2.01, "s", self.targets), ("a, 2.01, s, <= 2, short", True))
+    def test_a_figure_is_met_up_to_its_target_and_short_beyond(self):
+        self.assertEqual(line("time", 2), ("time, 2, s, <= 2, met, -", False))
+        self.assertEqual(line("time", 2.01), ("time, 2.01, s, <= 2, short, -", True))
+        self.assertEqual(line("speed", 3), ("speed, 3, s, >= 3, met, -", False))
+        self.assertEqual(line("speed", 2.99), ("speed, 2.99, s, >= 3, short, -", True))
 
     def test_no_number_is_short(self):
-        self.assertTrue(figures.line("a", float("nan"), "s", self.targets)[1])
+        self.assertTrue(line("time", float("nan"))[1])
+        self.assertTrue(line("speed", float("nan"))[1])
 
     def test_a_figure_without_a_target_is_only_shown(self):
-        self.assertEqual(figures.line("b", 1, "s", self.targets), ("b, 1, s, -, -", False))
+        self.assertEqual(line("other", 1, notes=["beside"]), ("other, 1, s, -, -, -, beside", False))
+
+    def test_a_figure_is_compared_with_the_baseline_of_its_own_machine_only(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "baseline.json"
+            Baseline(path).record([Figure("time", 1.6, "s")])
+            self.assertEqual(line("time", 2, Baseline(path))[0], "time, 2, s, <= 2, met, +25 %")
+            path.write_text(path.read_text().replace(measuring.machine(), "another"))
+            self.assertEqual(line("time", 2, Baseline(path))[0], "time, 2, s, <= 2, met, -")
+
+    def test_the_longest_bound_binds(self):
+        self.assertEqual(measuring.bound({"memory": 2.0, "arithmetic": 1.0}), ["bound 2 (memory; arithmetic 1)"])
+
+    def test_targets_have_a_direction(self):
+        self.assertLessEqual({direction for direction, _ in figures.TARGETS.values()}, {"<=", ">="})
+
+
+class Lammps(unittest.TestCase):
+    def test_its_cpu_time_contacts_and_rebuilds_are_read(self):
+        said = """Step c_contacts
+       0     1.0
+     200     5.0
+Loop time of 9 on 1 procs for 200 steps with 1000 atoms
+10.0% CPU use with 1 MPI tasks x 1 OpenMP threads
+Step c_contacts
+     200     5.0
+     700     5.2
+Loop time of 5 on 1 procs for 500 steps with 1000 atoms
+
+80.0% CPU use with 1 MPI tasks x 1 OpenMP threads
+Neighbor list builds = 4
+"""
+        read = peers.read(said)
+        self.assertAlmostEqual(read["figure"], 8.0)
+        self.assertAlmostEqual(read["contacts"], 5.1)
+        self.assertAlmostEqual(read["rebuild"], 175)
 
 
 if __name__ == "__main__":
