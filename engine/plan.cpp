@@ -8,6 +8,8 @@
 #include <numbers>
 #include <sstream>
 
+#include "coupling/transfer.h"
+
 namespace bedflow {
 
 namespace {
@@ -17,7 +19,7 @@ namespace {
 constexpr double fluidized_substep_seconds = 0.014e-6;  // a particle, without history
 constexpr double resting_substep_seconds = 0.065e-6;    // the same in a bed at rest, five contacts each
 constexpr double history_factor = 1.35;
-constexpr double particle_step_seconds = 0.18e-6;  // to the grid and back
+constexpr double particle_step_seconds = 0.07e-6;  // to the grid and back
 constexpr double cell_step_seconds = 0.25e-6;      // two outer iterations of SIMPLE
 
 std::string number(double value) {
@@ -87,13 +89,17 @@ void plan_space(Plan& plan) {
   const Scene& scene = plan.scene;
   bool shared = plan.ranks > 1;
   for (int d = 0; d < 3; ++d) shared = shared || scene.periodic[d];
-  plan.ghosts = scene.coupling && shared ? 2 : 1;  // a particle may stand half a skin beyond its block
-  if (scene.gas) plan.ghosts = std::max(plan.ghosts, ghosts_of(scene.gas->setup.convection));
   for (int d = 0; d < 3; ++d)
     if (scene.particles && std::abs(scene.gravity[d]) > 0.5 * norm(scene.gravity)) plan.tall = d;
   plan.cells = scene.cells;
+  if (scene.gas) plan.ghosts = ghosts_of(scene.gas->setup.convection);
   if (scene.particles) {
     plan.skin = scene.particles->skin > 0 ? scene.particles->skin : 0.2 * scene.particles->diameter;
+    if (scene.coupling) {
+      const Vec3 spacing{scene.size.x / scene.cells[0], scene.size.y / scene.cells[1], scene.size.z / scene.cells[2]};
+      plan.ghosts =
+          std::max(plan.ghosts, kernel_ghosts(scene.coupling->kernel, scene.particles->diameter, spacing, plan.skin, shared));
+    }
     const double reach = scene.particles->diameter + plan.skin;
     for (int d = 0; d < 3; ++d) {
       if (!scene.gas) plan.cells[d] = std::max(1, static_cast<int>(scene.size[d] / (2 * scene.particles->diameter)));
@@ -146,6 +152,17 @@ void check_memory(Plan& plan) {
   }
 }
 
+std::string kernel_text(const Scene& scene) {
+  const std::string name = std::visit([](const auto& kernel) { return std::string(kernel.name); }, scene.coupling->kernel);
+  if (const auto* dpvm = std::get_if<SquareDpvm>(&scene.coupling->kernel)) {
+    return name + ", " + number(dpvm->width) + " d wide" + (dpvm->caps ? ", shared by caps" : "");
+  }
+  if (const auto* gaussian = std::get_if<Gaussian>(&scene.coupling->kernel)) {
+    return name + ", " + number(gaussian->width) + " d wide at half maximum";
+  }
+  return name + ", as wide as the cells";
+}
+
 void plan_parts(Plan& plan) {
   const Scene& scene = plan.scene;
   const auto add = [&](const char* part, bool on, const std::string& why) { plan.items.push_back({part, on, why}); };
@@ -175,6 +192,7 @@ void plan_parts(Plan& plan) {
       scene.coupling ? "gas and particles are both there" : "there is only one of the two");
   if (scene.coupling) {
     add("drag law", true, std::visit([](const auto& law) { return std::string(law.name); }, scene.coupling->drag));
+    add("kernel", true, kernel_text(scene));
     add("displacement of gas, ∂ε/∂t", scene.coupling->displacement,
         scene.coupling->displacement
             ? "default"

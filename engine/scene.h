@@ -11,6 +11,7 @@
 #include "gas/simple.h"
 #include "models/contact.h"
 #include "models/drag.h"
+#include "models/kernel.h"
 #include "models/tangential.h"
 #include "particles/dem.h"
 #include "particles/seeding.h"
@@ -49,6 +50,7 @@ struct ParticleScene {
 
 struct CouplingScene {
   Drag drag;
+  Kernel kernel;
   bool displacement = true;
   double fraction_floor = 0.35;
 };

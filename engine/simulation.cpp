@@ -47,8 +47,12 @@ Simulation::GasPart::GasPart(const Decomposition& decomposition, const Plan& pla
 
 Simulation::CouplingPart::CouplingPart(const Decomposition& decomposition, const Plan& plan, GasPart& gas, PhaseTimer& timer)
     : exchange(gas.grid),
-      transfer(decomposition, gas.grid, gas.halo, plan.scene.particles->mass / plan.scene.particles->density,
-               plan.scene.coupling->fraction_floor, timer),
+      transfer(decomposition, gas.grid, gas.halo,
+               {.kernel = plan.scene.coupling->kernel,
+                .diameter = plan.scene.particles->diameter,
+                .particle_volume = plan.scene.particles->mass / plan.scene.particles->density,
+                .fraction_floor = plan.scene.coupling->fraction_floor},
+               timer),
       fraction_before(gas.grid) {}
 
 Simulation::Simulation(const Plan& plan, const Comm& comm, PhaseTimer& timer)

@@ -37,30 +37,41 @@ void check_time(const v1::Case& value, CaseFaults& faults) {
   }
 }
 
-// The hat reaches one cell to either side. Its base, two cells, must not be narrower than the particle; and a cell must hold
-// one particle's worth of volume with room to spare, Δ* = ∛(dx dy dz)/d ≥ 1, or ε falls to 0 in it.
+// How narrow a cell may be for the chosen kernel, in diameters; 0: it does not matter.
+double narrowest_cell(const v1::Coupling& coupling) {
+  if (coupling.has_hat() || coupling.has_garg()) return 0.5;  // its base, two cells, is not narrower than the particle
+  if (coupling.has_square_dpvm()) return 0.34 * coupling.square_dpvm().width();  // a cube over four cells at most
+  return 0;
+}
+
+// And a cell must hold one particle's worth of volume with room to spare, Δ* = ∛(dx dy dz)/d ≥ 1, or ε falls to 0 in it.
 void check_cells_against_diameter(const v1::Case& value, CaseFaults& faults) {
-  if (!value.has_gas() || !value.has_particles() || !value.coupling().has_hat() || !value.domain().has_cells()) return;
-  const double diameter = largest_diameter(value.particles());
+  if (!value.has_gas() || !value.has_particles() || !value.domain().has_cells()) return;
+  const double diameter = largest_diameter(value.particles()), narrowest = narrowest_cell(value.coupling());
+  if (narrowest == 0) return;
   const std::string d =
       (value.particles().types_size() > 0 ? "the largest diameter, " : "particles.diameter, ") + number_text(diameter) + " m";
+  const std::string kernel = "the kernel coupling." + std::string(value.coupling().has_hat()    ? "hat"
+                                                                  : value.coupling().has_garg() ? "garg"
+                                                                                                : "square_dpvm");
   double volume = 1;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const double length = component(value.domain().size(), axis);
     const double edge = length / component(value.domain().cells(), axis);
     volume *= edge;
-    if (!(length > 0) || !(edge < diameter / 2)) continue;
-    const double most = std::floor(2 * length / diameter);
-    faults.push_back(
-        {"domain.cells." + std::string(axis_names[axis]),
-         "makes cells of " + number_text(edge) + " m, but the kernel coupling.hat needs at least half of " + d + "; " +
-             (most >= 1 ? "use at most " + number_text(most) : "make domain.size." + std::string(axis_names[axis]) + " larger")});
+    if (!(length > 0) || !(edge < narrowest * diameter)) continue;
+    const double most = std::floor(length / (narrowest * diameter));
+    faults.push_back({"domain.cells." + std::string(axis_names[axis]),
+                      "makes cells of " + number_text(edge) + " m, but " + kernel + " needs at least " + number_text(narrowest) +
+                          " of " + d + ": " +
+                          (most >= 1 ? "use at most " + number_text(most) + ", or coupling.gaussian"
+                                     : "make domain.size." + std::string(axis_names[axis]) + " larger")});
   }
   const double ratio = std::cbrt(volume) / diameter;
   if (!(volume > 0) || !(ratio < 1)) return;
   faults.push_back({"domain.cells", "makes cells of " + number_text(std::round(ratio * 1e3) / 1e3) +
-                                        " diameters (cube root of their volume over " + d +
-                                        "): the kernel coupling.hat needs at least 1; use fewer cells"});
+                                        " diameters (cube root of their volume over " + d + "): " + kernel +
+                                        " needs at least 1; use fewer cells, or coupling.gaussian"});
 }
 
 void check_viscosity(const v1::Case& value, CaseFaults& faults) {

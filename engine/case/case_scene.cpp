@@ -160,9 +160,23 @@ Drag drag(const v1::Coupling& from) {
   }
 }
 
+Kernel kernel(const v1::Coupling& from) {
+  switch (from.kernel_case()) {
+    case v1::Coupling::kSquareDpvm:
+      return SquareDpvm{from.square_dpvm().width(), from.square_dpvm().caps()};
+    case v1::Coupling::kGarg:
+      return Garg{};
+    case v1::Coupling::kGaussian:
+      return Gaussian{{}, from.gaussian().width()};
+    default:
+      return Hat{};
+  }
+}
+
 CouplingScene coupling_scene(const v1::Coupling& from) {
   CouplingScene scene;
   scene.drag = drag(from);
+  scene.kernel = kernel(from);
   scene.displacement = from.displacement();
   scene.fraction_floor = from.gas_fraction_floor();
   return scene;

@@ -2,126 +2,91 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
-
-#include "base/check.h"
+#include <cstring>
+#include <stdexcept>
 
 namespace bedflow {
 
-// Stencils of one place along each direction, on the centres and on the faces, as offsets into a field's data.
-struct Transfer::Weights {
-  struct Pair {
-    std::ptrdiff_t offset[2];
-    double weight[2];
-  };
-  Pair centre[3], face[3];
-  std::ptrdiff_t origin;
+namespace {
 
-  // Calls take(offset, weight) for the eight points of a lattice: faces of direction d, or the centres (d = -1).
-  template <class Take>
-  void each(int d, Take take) const {
-    const Pair& px = d == 0 ? face[0] : centre[0];
-    const Pair& py = d == 1 ? face[1] : centre[1];
-    const Pair& pz = d == 2 ? face[2] : centre[2];
-    for (int c = 0; c < 2; ++c)
-      for (int b = 0; b < 2; ++b) {
-        const std::ptrdiff_t row = origin + pz.offset[c] + py.offset[b];
-        const double weight = pz.weight[c] * py.weight[b];
-        take(row + px.offset[0], weight * px.weight[0]);
-        take(row + px.offset[1], weight * px.weight[1]);
-      }
-  }
-  double sum(int d, const double* values) const {
-    double result = 0;
-    each(d, [&](std::ptrdiff_t at, double weight) { result += weight * values[at]; });
-    return result;
-  }
-};
+using AnyStencils = std::variant<Stencils<2>, Stencils<3>, Stencils<4>>;
 
-Transfer::Transfer(const Decomposition& decomposition, const Grid& grid, Halo& halo, double particle_volume,
-                   double fraction_floor, PhaseTimer& timer)
+AnyStencils stencils_for(int points, const Grid& grid) {
+  CHECK(points <= most_points && (points == 2 || grid.ghosts >= points - 1), points, grid.ghosts);
+  if (points == 2) return Stencils<2>(grid);
+  if (points == 3) return Stencils<3>(grid);
+  return Stencils<4>(grid);
+}
+
+}  // namespace
+
+int kernel_points(const Kernel& kernel, double diameter, Vec3 spacing) {
+  const double diameters = diameter / std::min({spacing.x, spacing.y, spacing.z});
+  return std::visit([&](const auto& law) { return law.points_for(diameters); }, kernel);
+}
+
+// A share of the face n + m, the (m + 1)th ghost, needs m ≤ ⌊reach + ½⌋ with `reach` beyond the block in cells; so does one of
+// the cell −m. Without neighbours only a lattice shorter than the stencil has shares, of 0, beyond its end.
+int kernel_ghosts(const Kernel& kernel, double diameter, Vec3 spacing, double skin, bool shared) {
+  const double narrowest = std::min({spacing.x, spacing.y, spacing.z});
+  const int beyond_end = kernel_points(kernel, diameter, spacing) - 1;
+  if (!shared) return beyond_end;
+  const auto* dpvm = std::get_if<SquareDpvm>(&kernel);
+  const double half_width = dpvm ? 0.5 * dpvm->width * diameter : 0.5 * narrowest;
+  return std::max(beyond_end, static_cast<int>((half_width + skin / 2) / narrowest + 0.5) + 1);
+}
+
+Transfer::Transfer(const Decomposition& decomposition, const Grid& grid, Halo& halo, const TransferSetup& setup,
+                   PhaseTimer& timer)
     : decomposition_(decomposition),
       grid_(grid),
       halo_(halo),
-      particle_volume_(particle_volume),
-      fraction_floor_(fraction_floor),
+      setup_(setup),
       timer_(timer),
+      lattices_(decomposition, grid),
+      stencils_(stencils_for(kernel_points(setup.kernel, setup.diameter, grid.spacing), grid)),
       gradient_(grid),
       buoyancy_share_(grid, 1) {
-  for (int d = 0; d < 3; ++d) {
-    shares_[d].resize(grid.size());
-    const bool low = decomposition.at_face(d, 0), high = decomposition.at_face(d, 1);
-    lowest_cell_[d] = low ? 0 : -grid.ghosts;
-    highest_cell_[d] = high ? grid.cells[d] - 1 : grid.cells[d] + grid.ghosts - 1;
-    lowest_face_[d] = low ? 1 : -grid.ghosts;
-    highest_face_[d] = highest_cell_[d];
+  for (auto& shares : shares_) shares.resize(grid.size());
+  if (const auto* gaussian = std::get_if<Gaussian>(&setup.kernel)) {
+    smoothing_.emplace(grid, lattices_, halo, gaussian->deviation(setup.diameter));
+    smooth_velocity_ = FaceField(grid);
   }
 }
 
-Transfer::Weights Transfer::weights(Vec3 place) const {
-  Weights result;
-  result.origin = grid_.index(0, 0, 0);
-  for (int d = 0; d < 3; ++d) {
-    const double s = (place[d] - grid_.low[d]) / grid_.spacing[d];  // in cells from the block's low corner
-    CHECK(s > 0.5 - grid_.ghosts && s < grid_.cells[d] + grid_.ghosts - 0.5, d, s);
-    const Stencil centre = Hat::along(s - 0.5, lowest_cell_[d], highest_cell_[d]);
-    const Stencil face = has_faces(d) ? Hat::along(s, lowest_face_[d], highest_face_[d]) : Stencil{{0, 0}, {0, 0}};
-    for (int side = 0; side < 2; ++side) {
-      result.centre[d].offset[side] = centre.index[side] * grid_.stride(d);
-      result.centre[d].weight[side] = centre.weight[side];
-      result.face[d].offset[side] = face.index[side] * grid_.stride(d);
-      result.face[d].weight[side] = face.weight[side];
-    }
-  }
-  return result;
-}
-
-double Transfer::at(const Field& field, Vec3 place) const {
-  return weights(place).sum(-1, field.data());
-}
-
-// A face next to a face of the box stands for the half cell beyond it too.
-double Transfer::node_volume(int d, int face) const {
-  double volume = 1;
-  if (decomposition_.at_face(d, 0) && face == 1) volume += 0.5;
-  if (decomposition_.at_face(d, 1) && face == grid_.cells[d] - 1) volume += 0.5;
-  return volume;
-}
-
-// Calls take(i, j, k, node volume in cells) for every point of a face lattice that this rank owns.
-template <class Take>
-void Transfer::each_owned_face(int d, Take take) const {
-  Int3 low{0, 0, 0}, high = grid_.cells;
-  low[d] = std::max(0, lowest_face_[d]);
-  high[d] = std::min(grid_.cells[d] - 1, highest_face_[d]) + 1;
-  for (int k = low[2]; k < high[2]; ++k)
-    for (int j = low[1]; j < high[1]; ++j)
-      for (int i = low[0]; i < high[0]; ++i) take(i, j, k, node_volume(d, d == 0 ? i : d == 1 ? j : k));
-}
+// ---------------------------------------------------------------------------------------------------- volume
 
 double Transfer::deposit_volume(const ParticleStore& particles, Field& fraction) {
   const PhaseTimer::Scope scope(timer_, Phase::deposit, particles.owned);
   fraction.fill(0);
   double* solids = fraction.data();
-  const double share = particle_volume_ / grid_.cell_volume();
-  for (std::size_t p = 0; p < particles.owned; ++p) {
-    weights(particles.position(p)).each(-1, [&](std::ptrdiff_t at, double weight) { solids[at] += share * weight; });
-  }
+  const double share = setup_.particle_volume / grid_.cell_volume();
+  std::visit(
+      [&]<int points>(Stencils<points>& stencils, const auto& kernel) {
+        stencils.locate(kernel, setup_.diameter, grid_, lattices_, particles);
+        for (std::size_t p = 0; p < particles.owned; ++p) {
+          const auto shares = stencils[p];
+          const double* x = stencils.x_shares(shares, cell_centres);
+          stencils.each_row(shares, cell_centres, [&](std::ptrdiff_t at, double weight) {
+            for (int q = 0; q < points; ++q) solids[at + q] += share * weight * x[q];
+          });
+        }
+      },
+      stencils_, setup_.kernel);
   halo_.add(fraction);
+  if (smoothing_) smoothing_->apply(fraction, cell_centres);
 
   double hidden = 0;
-  for (int k = 0; k < grid_.cells[2]; ++k)
-    for (int j = 0; j < grid_.cells[1]; ++j)
-      for (int i = 0; i < grid_.cells[0]; ++i) {
-        double& value = fraction(i, j, k);
-        value = 1 - value;
-        if (value < fraction_floor_) {
-          hidden += fraction_floor_ - value;
-          value = fraction_floor_;
-        }
-      }
+  const double floor = setup_.fraction_floor;
+  lattices_.each_owned_row(cell_centres, [&](Int3 first, int n) {
+    double* row = &fraction(first[0], first[1], first[2]);
+    for (int i = 0; i < n; ++i) {
+      const double value = 1 - row[i];
+      row[i] = std::max(value, floor);
+      hidden += row[i] - value;
+    }
+  });
   halo_.fill(fraction);
-
   mirror_at_faces(fraction);
   return decomposition_.comm().sum(hidden * grid_.cell_volume());
 }
@@ -143,54 +108,118 @@ void Transfer::mirror_at_faces(Field& field) const {
     }
 }
 
-template <class Drag>
-void Transfer::deposit_drag(const Drag& drag, const DragScene& scene, const ParticleStore& particles, const GasState& gas,
-                            Exchange& exchange) {
-  const PhaseTimer::Scope scope(timer_, Phase::deposit, particles.owned);
-  for (auto& shares : shares_) std::fill(shares.begin(), shares.end(), Share{});
-  drag_.resize(particles.owned);
-  const double share = particle_volume_ / grid_.cell_volume();
-  for (std::size_t p = 0; p < particles.owned; ++p) {
-    const Weights at_place = weights(particles.position(p));
-    const Vec3 velocity = particles.velocity(p);
-    Vec3 slip;
-    for (int d = 0; d < 3; ++d) slip[d] = at_place.sum(d, gas.velocity[d].data()) - velocity[d];
-    const double b = drag(scene, norm(slip), at_place.sum(-1, gas.fraction.data()));
-    drag_[p] = b;
-    for (int d = 0; d < 3; ++d) {
-      Share* shares = shares_[d].data();
-      const Share whole{b, b * velocity[d], share, 0};
-      at_place.each(d, [&](std::ptrdiff_t at, double weight) { shares[at] += weight * whole; });
-    }
-  }
+// ---------------------------------------------------------------------------------------------------- drag
+
+const FaceField& Transfer::felt_velocity(const FaceField& velocity) {
+  if (!smoothing_) return velocity;
+  smooth_velocity_ = velocity;
+  smoothing_->apply(smooth_velocity_);
+  return smooth_velocity_;
+}
+
+// |U − V| and ε at the places of the particles.
+void Transfer::slips(const ParticleStore& particles, const FaceField& velocity, const Field& fraction) {
+  slip_.resize(particles.owned);
+  fraction_.resize(particles.owned);
+  std::visit(
+      [&](const auto& stencils) {
+        for (std::size_t p = 0; p < particles.owned; ++p) {
+          const auto shares = stencils[p];
+          Vec3 slip = -particles.velocity(p);
+          for (int d = 0; d < 3; ++d)
+            if (lattices_.has_faces(d)) slip[d] += stencils.sum(shares, d, velocity[d].data());
+          slip_[p] = norm(slip);
+          fraction_[p] = stencils.sum(shares, cell_centres, fraction.data());
+        }
+      },
+      stencils_);
+}
+
+// b, bV and buoyancy of every particle to the points around it.
+void Transfer::spread(const ParticleStore& particles, Exchange& exchange) {
+  const double share = setup_.particle_volume / grid_.cell_volume();
+  std::visit(
+      [&]<int points>(const Stencils<points>& stencils) {
+        for (std::size_t p = 0; p < particles.owned; ++p) {
+          const auto shares = stencils[p];
+          const Vec3 velocity = particles.velocity(p);
+          const double b = drag_[p];
+          for (int d = 0; d < 3; ++d) {
+            if (!lattices_.has_faces(d)) continue;
+            Share along[points];
+            for (int q = 0; q < points; ++q) along[q] = stencils.x_shares(shares, d)[q] * Share{b, b * velocity[d], share, 0};
+            Share* to = shares_[d].data();
+            stencils.each_row(shares, d, [&](std::ptrdiff_t at, double weight) {
+              for (int q = 0; q < points; ++q) to[at + q] += weight * along[q];
+            });
+          }
+        }
+      },
+      stencils_);
   for (int d = 0; d < 3; ++d) {
     double *drags = exchange.drag[d].data(), *momenta = exchange.drag_momentum[d].data(), *solids = exchange.buoyancy[d].data();
-    const Share* shares = shares_[d].data();
-    for (std::size_t at = 0; at < shares_[d].size(); ++at) {
-      drags[at] = shares[at][0];
-      momenta[at] = shares[at][1];
-      solids[at] = shares[at][2];
-    }
+    Share* shares = shares_[d].data();
+    lattices_.each_row(d, [&](std::ptrdiff_t first, int n) {
+      for (auto at = first; at < first + n; ++at) {
+        drags[at] = shares[at][0];
+        momenta[at] = shares[at][1];
+        solids[at] = shares[at][2];
+        shares[at] = Share{};
+      }
+    });
   }
   halo_.add(exchange.drag);
   halo_.add(exchange.drag_momentum);
   halo_.add(exchange.buoyancy);
+}
 
-  // Per cell of the node; ∇p acts on no more solids than the floor of ε leaves room for, on both sides of the exchange.
+// Per cell of the node. ∇p acts on no more solids than the floor of ε leaves room for, on both sides of the exchange.
+void Transfer::per_node_volume(Exchange& exchange) {
+  const double most = 1 - setup_.fraction_floor;
   for (int d = 0; d < 3; ++d) {
-    each_owned_face(d, [&](int i, int j, int k, double node) {
-      exchange.drag[d](i, j, k) /= node;
-      exchange.drag_momentum[d](i, j, k) /= node;
-      double& solids = exchange.buoyancy[d](i, j, k);
-      solids /= node;
-      const double limited = std::min(solids, 1 - fraction_floor_);
-      buoyancy_share_[d](i, j, k) = solids > limited ? limited / solids : 1;
-      solids = limited;
+    const auto each_row = [&](auto row) {
+      lattices_.each_owned_row(d, [&](Int3 first, int n) {
+        const std::ptrdiff_t c = grid_.index(first[0], first[1], first[2]);
+        row(exchange.drag[d].data() + c, exchange.drag_momentum[d].data() + c, exchange.buoyancy[d].data() + c,
+            buoyancy_share_[d].data() + c, lattices_.node_volume(d, first), n);
+      });
+    };
+    each_row([](double* drag, double* momentum, double* solids, double*, Lattices::NodeVolume node, int n) {
+      for (int i = 0; i < n; ++i) {
+        drag[i] /= node[i];
+        momentum[i] /= node[i];
+        solids[i] /= node[i];
+      }
+    });
+    if (smoothing_) {
+      smoothing_->apply(exchange.drag[d], d);
+      smoothing_->apply(exchange.drag_momentum[d], d);
+      smoothing_->apply(exchange.buoyancy[d], d);
+    }
+    each_row([=](double*, double*, double* solids, double* share, Lattices::NodeVolume, int n) {
+      for (int i = 0; i < n; ++i) {
+        share[i] = solids[i] > most ? most / solids[i] : 1;
+        solids[i] = std::min(solids[i], most);
+      }
     });
   }
   halo_.fill(exchange.drag);
   halo_.fill(exchange.drag_momentum);
   halo_.fill(exchange.buoyancy);
+}
+
+template <class Drag>
+void Transfer::deposit_drag(const Drag& drag, const DragScene& scene, const ParticleStore& particles, const GasState& gas,
+                            Exchange& exchange) {
+  const PhaseTimer::Scope scope(timer_, Phase::deposit, particles.owned);
+  slips(particles, felt_velocity(gas.velocity), gas.fraction);
+  drag_.resize(particles.owned);
+  const double *slip = slip_.data(), *fraction = fraction_.data();
+  double* b = drag_.data();
+#pragma GCC ivdep
+  for (std::size_t p = 0; p < particles.owned; ++p) b[p] = drag(scene, slip[p], fraction[p]);
+  spread(particles, exchange);
+  per_node_volume(exchange);
 }
 
 template void Transfer::deposit_drag(const GidaspowBlended&, const DragScene&, const ParticleStore&, const GasState&, Exchange&);
@@ -205,50 +234,60 @@ template void Transfer::deposit_drag(const Beetstra&, const DragScene&, const Pa
 template void Transfer::deposit_drag(const Tenneti&, const DragScene&, const ParticleStore&, const GasState&, Exchange&);
 template void Transfer::deposit_drag(const ConstantDrag&, const DragScene&, const ParticleStore&, const GasState&, Exchange&);
 
-double Transfer::pressure_gradient(const Field& pressure, int d, std::ptrdiff_t at) const {
-  return (pressure.data()[at] - pressure.data()[at - grid_.stride(d)]) / grid_.spacing[d];
-}
+// ---------------------------------------------------------------------------------------------------- back to the particles
 
 void Transfer::sample(const GasState& gas, ParticleStore& particles) {
   const PhaseTimer::Scope scope(timer_, Phase::sample, particles.owned);
-  for (int d = 0; d < 3; ++d) {
-    each_owned_face(d, [&](int i, int j, int k, double /*node*/) {
-      gradient_[d](i, j, k) = buoyancy_share_[d](i, j, k) * pressure_gradient(gas.pressure, d, grid_.index(i, j, k));
+  const double* pressure = gas.pressure.data();
+  for (int d = 0; d < 3; ++d)
+    lattices_.each_owned_row(d, [&](Int3 first, int n) {
+      const std::ptrdiff_t c = grid_.index(first[0], first[1], first[2]);
+      double* gradient = gradient_[d].data();
+      const double* share = buoyancy_share_[d].data();
+      for (auto at = c; at < c + n; ++at) gradient[at] = share[at] * gradient_at(pressure, d, at);
     });
+  if (smoothing_) {
+    smoothing_->apply(gradient_);
+  } else {
+    halo_.fill(gradient_);
   }
-  halo_.fill(gradient_);
-  for (std::size_t p = 0; p < particles.owned; ++p) {
-    const Weights at_place = weights(particles.position(p));
-    const double b = drag_[p];
-    for (int d = 0; d < 3; ++d) {
-      const double* velocity = gas.velocity[d].data();
-      const double* gradient = gradient_[d].data();
-      double u = 0, slope = 0;
-      at_place.each(d, [&](std::ptrdiff_t at, double weight) {
-        u += weight * velocity[at];
-        slope += weight * gradient[at];
-      });
-      particles.gas_force[p][d] = b * (u - particles.velocity(p)[d]) - particle_volume_ * slope;
-    }
-  }
+  const FaceField& velocity = felt_velocity(gas.velocity);
+  std::visit(
+      [&]<int points>(const Stencils<points>& stencils) {
+        for (std::size_t p = 0; p < particles.owned; ++p) {
+          const auto shares = stencils[p];
+          const double b = drag_[p];
+          for (int d = 0; d < 3; ++d) {
+            double u = 0, slope = 0;
+            if (lattices_.has_faces(d)) {
+              u = stencils.sum(shares, d, velocity[d].data());
+              slope = stencils.sum(shares, d, gradient_[d].data());
+            }
+            particles.gas_force[p][d] = b * (u - particles.velocity(p)[d]) - setup_.particle_volume * slope;
+          }
+        }
+      },
+      stencils_);
 }
 
 ExchangeBalance Transfer::balance(const GasState& gas, const Exchange& exchange, const ParticleStore& particles) const {
   std::array<double, 9> sums{};  // lost x y z, received x y z, scale x y z
-  for (std::size_t p = 0; p < particles.owned; ++p)
-    for (int d = 0; d < 3; ++d) {
-      // Without a face inside, nothing but the walls can take the particle's drag in this direction.
-      if (!has_faces(d)) continue;
+  for (int d = 0; d < 3; ++d) {
+    // Without a face inside, nothing but the walls can take the particle's drag in this direction.
+    for (std::size_t p = 0; p < particles.owned && lattices_.has_faces(d); ++p) {
       sums[3 + d] += particles.gas_force[p][d];
       sums[6 + d] += std::abs(particles.gas_force[p][d]);
     }
-  for (int d = 0; d < 3; ++d) {
-    each_owned_face(d, [&](int i, int j, int k, double node) {
-      const double drag = exchange.drag[d](i, j, k) * gas.velocity[d](i, j, k) - exchange.drag_momentum[d](i, j, k);
-      const double buoyancy =
-          -grid_.cell_volume() * exchange.buoyancy[d](i, j, k) * pressure_gradient(gas.pressure, d, grid_.index(i, j, k));
-      sums[d] += node * (drag + buoyancy);
-      sums[6 + d] += node * (std::abs(drag) + std::abs(buoyancy));
+    lattices_.each_owned_row(d, [&](Int3 first, int n) {
+      const std::ptrdiff_t c = grid_.index(first[0], first[1], first[2]);
+      const auto node = lattices_.node_volume(d, first);
+      for (int i = 0; i < n; ++i) {
+        const std::ptrdiff_t at = c + i;
+        const double drag = exchange.drag[d].data()[at] * gas.velocity[d].data()[at] - exchange.drag_momentum[d].data()[at];
+        const double buoyancy = -grid_.cell_volume() * exchange.buoyancy[d].data()[at] * gradient_at(gas.pressure.data(), d, at);
+        sums[d] += node[i] * (drag + buoyancy);
+        sums[6 + d] += node[i] * (std::abs(drag) + std::abs(buoyancy));
+      }
     });
   }
   decomposition_.comm().sum(sums);

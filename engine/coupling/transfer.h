@@ -1,13 +1,17 @@
 // Particles to grid and back, with the same weights both ways: what the gas gives the particles receive, to round-off.
 //
-// Four lattices: the cell centres (volume, ε) and the faces of each velocity component (b, bV, buoyancy, U, ∇p). A face of
-// the box is no point of a face lattice; its share folds onto the next face inside, which therefore stands for 1½ cells (2
-// between walls two cells apart): sums over faces are weighted with that `node volume`.
+// Volume and ε go to the cell centres; b, bV, buoyancy, U, ∇p to the faces of each velocity component (lattices.h).
 #pragma once
 
 #include <array>
+#include <optional>
+#include <variant>
+#include <vector>
 
 #include "base/phase_timer.h"
+#include "coupling/lattices.h"
+#include "coupling/smoothing.h"
+#include "coupling/stencils.h"
 #include "gas/simple.h"
 #include "grid/grid.h"
 #include "grid/halo.h"
@@ -17,6 +21,19 @@
 
 namespace bedflow {
 
+// How many points along each direction carry a particle; most_points at most.
+int kernel_points(const Kernel& kernel, double diameter, Vec3 spacing);
+inline constexpr int most_points = 4;
+// Ghost layers that it takes. shared: blocks or periodic images meet, and a particle may stand half a skin (m) beyond its block.
+int kernel_ghosts(const Kernel& kernel, double diameter, Vec3 spacing, double skin, bool shared);
+
+struct TransferSetup {
+  Kernel kernel{};
+  double diameter = 0;           // of a particle, m
+  double particle_volume = 0;    // m³
+  double fraction_floor = 0.35;  // of ε
+};
+
 // Force between gas and particles, summed over the box, N.
 struct ExchangeBalance {
   Vec3 lost_by_gas, received_by_particles;
@@ -25,10 +42,10 @@ struct ExchangeBalance {
 
 class Transfer {
  public:
-  Transfer(const Decomposition& decomposition, const Grid& grid, Halo& halo, double particle_volume, double fraction_floor,
-           PhaseTimer& timer);
+  Transfer(const Decomposition& decomposition, const Grid& grid, Halo& halo, const TransferSetup& setup, PhaseTimer& timer);
 
   // ε at cell centres, ghosts and the cells beyond walls too. Returns the solids volume (m³, all ranks) that the floor hid.
+  // The particles stay where they are until the next call.
   double deposit_volume(const ParticleStore& particles, Field& fraction);
 
   // Beyond a face of the box a centre field is what it is in the cell inside.
@@ -45,29 +62,30 @@ class Transfer {
   // Sums what the gas lost in the step (from its own fields) and what the particles received. Collective.
   ExchangeBalance balance(const GasState& gas, const Exchange& exchange, const ParticleStore& particles) const;
 
-  // Value of a centre field at a place, with the weights of the deposit.
-  double at(const Field& field, Vec3 place) const;
-
  private:
   using Share = double __attribute__((vector_size(32)));  // b, bV, solids of a face, and nothing: added as one
-  struct Weights;                                         // stencils of one particle on both lattices of each direction
-  Weights weights(Vec3 place) const;
-  bool has_faces(int d) const { return lowest_face_[d] <= highest_face_[d]; }
-  double node_volume(int d, int face) const;  // in cells
-  template <class Take>
-  void each_owned_face(int d, Take take) const;
-  double pressure_gradient(const Field& pressure, int d, std::ptrdiff_t at) const;
+  // U as a particle feels it: that of the gas, or smoothed.
+  const FaceField& felt_velocity(const FaceField& velocity);
+  void slips(const ParticleStore& particles, const FaceField& velocity, const Field& fraction);
+  void spread(const ParticleStore& particles, Exchange& exchange);
+  void per_node_volume(Exchange& exchange);
+  double gradient_at(const double* pressure, int d, std::ptrdiff_t at) const {
+    return (pressure[at] - pressure[at - grid_.stride(d)]) / grid_.spacing[d];
+  }
 
   const Decomposition& decomposition_;
   const Grid& grid_;
   Halo& halo_;
-  double particle_volume_, fraction_floor_;
+  TransferSetup setup_;
   PhaseTimer& timer_;
-  Int3 lowest_cell_{}, highest_cell_{}, lowest_face_{}, highest_face_{};
-  std::vector<double> drag_;                  // b of each owned particle, kg/s
-  std::array<std::vector<Share>, 3> shares_;  // of the faces of each direction, in a field's order
-  FaceField gradient_;                        // ∇p as the particles feel it, Pa/m
+  Lattices lattices_;
+  std::optional<Smoothing> smoothing_;
+  std::variant<Stencils<2>, Stencils<3>, Stencils<4>> stencils_;
+  std::vector<double> slip_, fraction_, drag_;  // of each owned particle: |U − V|, ε, b
+  std::array<std::vector<Share>, 3> shares_;    // of the faces of each direction, in a field's order; 0 between sweeps
+  FaceField gradient_;                          // ∇p as the particles feel it, Pa/m
   FaceField buoyancy_share_;  // share of ∇p that acts on particles: 1 but where the floor limits the solids of a face
+  FaceField smooth_velocity_;
 };
 
 }  // namespace bedflow

@@ -6,6 +6,7 @@ usage: figures.py [--record] BIN_FOLDER [GROUP...]
 
 dem     the particle side by itself, CPU time on one core, medians of three
 gas     the gas by itself, likewise
+transfer  between particles and gas, both ways, likewise
 bed     whole beds, by the engine's summary.json
 peers   ours against LAMMPS on the same bed, in turn (needs Debian's package lammps)
 
@@ -27,6 +28,8 @@ TARGETS = {
     "dem/spring/agitated": ("<=", 0.065),
     "dem/spring/million": ("<=", 0.0975),
     "dem/spring/memory": ("<=", 700),
+    "transfer/mueller": ("<=", 0.10),
+    "transfer/goldschmidt": ("<=", 0.10),
     "peers/lammps/coulomb/settled": (">=", 3),
     "peers/lammps/coulomb/agitated": (">=", 3),
     "peers/lammps/spring/settled": (">=", 2.5),
@@ -47,6 +50,10 @@ def gas(bin_folder):
     yield from sweep(bin_folder, "gas")
 
 
+def transfer(bin_folder):
+    yield from sweep(bin_folder, "transfer")
+
+
 def bed(bin_folder, name="mueller", fluidized=0.25, measured=0.05):
     """A whole bed on one rank: run until it is fluidized, then resumed and measured (simulated s)."""
     with scratch() as folder:
@@ -58,7 +65,7 @@ def bed(bin_folder, name="mueller", fluidized=0.25, measured=0.05):
     yield Figure(f"bed/{name}/cost", summary["cpu_seconds_per_simulated_second"], "CPU s per simulated s")
 
 
-GROUPS = {"dem": dem, "gas": gas, "bed": bed, "peers": peers.against_lammps}
+GROUPS = {"dem": dem, "gas": gas, "transfer": transfer, "bed": bed, "peers": peers.against_lammps}
 
 
 def main(arguments):

@@ -128,13 +128,13 @@ TEST(ReadyCases, CarryTheReferenceDataInSi) {
 }
 
 TEST(Presets, AreRefusedForWhatIsNotBuiltYetAndForNothingElse) {
-  const std::vector<std::string> garg{"coupling.garg", "coupling.sub_stepped", "time.longest_step"};
+  const std::vector<std::string> garg{"coupling.sub_stepped", "time.longest_step"};
   const std::map<std::string, std::vector<std::string>> expected{
       {"mfix-exa-2018", {}},
       {"mfix-garg-upwind", garg},
       {"mfix-garg-smart", garg},
-      {"mfix-dpvm-upwind", {"coupling.square_dpvm"}},
-      {"mfix-dpvm-smart", {"coupling.square_dpvm"}},
+      {"mfix-dpvm-upwind", {}},
+      {"mfix-dpvm-smart", {}},
       {"bedflow", {}}};
   EXPECT_EQ(ready_presets().size(), expected.size());
   for (const std::string& bed : beds) {

@@ -82,6 +82,17 @@ TEST(CaseRules, CellsMustHoldAParticleForTheHat) {
                 c.mutable_domain()->mutable_cells()->set_z(12);
               }),
               ElementsAre(fault_at("domain.cells", "at least 1")));
+  // a Gaussian has its own width; the cube of the DPVM, 1.8 mm, must stay within four cells
+  EXPECT_THAT(after([](v1::Case& c) {
+                c.mutable_coupling()->mutable_gaussian();
+                c.mutable_domain()->mutable_cells()->set_y(400);
+              }),
+              IsEmpty());
+  EXPECT_THAT(after([](v1::Case& c) {
+                c.mutable_coupling()->mutable_square_dpvm();
+                c.mutable_domain()->mutable_cells()->set_y(200);
+              }),
+              ElementsAre(fault_at("domain.cells.y", "use at most 196")));
   // a direction that is one cell deep is held to the same limit
   EXPECT_THAT(
       after([](v1::Case& c) {

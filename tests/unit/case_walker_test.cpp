@@ -255,7 +255,7 @@ TEST(CaseWalker, MissingChoiceNamesItsBuiltArms) {
   value.mutable_coupling()->clear_hat();
   value.mutable_particles()->clear_tangential();
   EXPECT_THAT(check_case(value),
-              AllOf(has_fault("coupling.kernel", "; set hat in coupling"),
+              AllOf(has_fault("coupling.kernel", "; set one of hat, square_dpvm, garg, gaussian in coupling"),
                     has_fault("particles.tangential", "; set one of frictionless, coulomb, spring in particles")));
 }
 

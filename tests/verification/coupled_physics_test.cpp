@@ -42,7 +42,7 @@ double fall_by_transfer(const DragScene& gas, double density, double gravity, do
       for (int i = -2; i < 6; ++i) state.pressure(i, j, k) = -gas.density * gravity * j;
   Exchange exchange(grid);
   const double volume = std::numbers::pi / 6 * cube(gas.diameter);
-  Transfer transfer(decomposition, grid, halo, volume, 0.35, timer);
+  Transfer transfer(decomposition, grid, halo, {.particle_volume = volume}, timer);
   DemSetup setup{
       .radius = gas.diameter / 2, .mass = density * volume, .gravity = {0, -gravity, 0}, .skin = 0.1 * gas.diameter, .gas = true};
   setup.sides[0] = setup.sides[2] = {Side::periodic, Side::periodic};
@@ -91,7 +91,7 @@ TEST(FixedBed, PressureDropIsErgunsExactly) {
     Exchange exchange(grid);
     // The stated diameter makes drag; the volume that is deposited gives ε = 0.5.
     const double fraction = 0.5, volume = (1 - fraction) * grid.cell_volume() / 8;
-    Transfer transfer(decomposition, grid, halo, volume, 0.35, timer);
+    Transfer transfer(decomposition, grid, halo, {.particle_volume = volume}, timer);
     ParticleStore bed;
     for (int k = 0; k < 6; ++k)
       for (int j = 0; j < 16; ++j)
@@ -130,7 +130,7 @@ TEST(Displacement, AMovingCloudDrivesTheGasThatItDisplaces) {
   Simple solver(decomposition, grid, halo, setup, timer);
   GasState gas(grid);
   const double volume = 0.05;
-  Transfer transfer(decomposition, grid, halo, volume, 0.35, timer);
+  Transfer transfer(decomposition, grid, halo, {.particle_volume = volume}, timer);
   solver.prepare(gas, 0);
   Exchange exchange(grid);
 
