@@ -9,8 +9,8 @@
 #include <random>
 
 #include "coupling/transfer.h"
+#include "hardware.h"
 #include "particles/cells.h"
-#include "performance/hardware.h"
 
 namespace bedflow {
 namespace {
