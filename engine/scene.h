@@ -8,7 +8,7 @@
 #include <variant>
 #include <vector>
 
-#include "gas/simple.h"
+#include "gas/gas_solver.h"
 #include "models/contact.h"
 #include "models/drag.h"
 #include "models/kernel.h"

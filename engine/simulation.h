@@ -9,7 +9,7 @@
 #include "base/phase_timer.h"
 #include "checkpoint/checkpoint.h"
 #include "coupling/transfer.h"
-#include "gas/simple.h"
+#include "gas/gas_solver.h"
 #include "particles/dem.h"
 #include "plan.h"
 
@@ -61,7 +61,7 @@ class Simulation {
     Grid grid;
     Halo halo;
     GasState state;
-    Simple solver;
+    GasSolver solver;
     GasPart(const Decomposition& decomposition, const Plan& plan, PhaseTimer& timer);
   };
   struct CouplingPart {

@@ -12,7 +12,7 @@
 #include "coupling/lattices.h"
 #include "coupling/smoothing.h"
 #include "coupling/stencils.h"
-#include "gas/simple.h"
+#include "gas/gas_solver.h"
 #include "grid/grid.h"
 #include "grid/halo.h"
 #include "models/drag.h"

@@ -7,7 +7,7 @@ namespace bedflow {
 
 namespace {
 
-constexpr int most_sweeps = 20;
+constexpr int most_sweeps = 200;
 
 }  // namespace
 
@@ -238,15 +238,16 @@ void Momentum::relax(int d, const double* u, Sums& sums) {
   sums.throughput += row_sums_[2].total() * grid_.face_area(d) / grid_.global[d];
 }
 
-// A sweep takes the error down to about coupling² of what it was; a tenth is enough, as the coefficients will change.
-void Momentum::solve(FaceField& velocity, double coupling) {
-  const double wanted = std::log(0.1) / (2 * std::log(std::clamp(coupling, 1e-3, 0.999)));
-  const int sweeps = std::clamp(static_cast<int>(std::ceil(wanted)), 1, most_sweeps);
+// A sweep takes the error down to about coupling² of what it was.
+double Momentum::solve(FaceField& velocity, double coupling, double leave) {
+  const double each = 2 * std::log(std::clamp(coupling, 1e-3, 0.999));
+  const int sweeps = std::clamp(static_cast<int>(std::ceil(std::log(leave) / each)), 1, most_sweeps);
   for (int n = 0; n < sweeps; ++n)
     for (int d = 0; d < 3; ++d) {
       sweep(d, n % 2 == 0 ? 1 : -1, velocity[d].data());
       halo_.fill(velocity[d]);
     }
+  return std::exp(sweeps * each);
 }
 
 // One Gauss–Seidel sweep; within a row all but the neighbour just done is gathered first.

@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "gas/boundaries.h"
-#include "gas/simple.h"
+#include "gas/gas_solver.h"
 #include "grid/halo.h"
 #include "grid/rows.h"
 
@@ -41,8 +41,9 @@ class Momentum {
   // ghosts are right, beyond the faces of the box too.
   Sums assemble(const GasState& state);
   // Gauss–Seidel sweeps, there and back, of the relaxed equations of each component: as many as the coupling (the largest of all
-  // ranks) asks for.
-  void solve(FaceField& velocity, double coupling);
+  // ranks) asks for to leave this share of the error, or the most that are worth while. Returns the share that they leave at
+  // most.
+  double solve(FaceField& velocity, double coupling, double leave);
 
   // After assemble: what a pressure difference over a face does to its velocity, m/s/Pa; 0 where none is solved. With Σa left
   // out of the diagonal (SIMPLEC: Van Doormaal & Raithby 1984).

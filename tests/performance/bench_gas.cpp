@@ -6,7 +6,7 @@
 
 #include <cmath>
 
-#include "gas/simple.h"
+#include "gas/gas_solver.h"
 #include "hardware.h"
 
 namespace bedflow {
@@ -29,10 +29,10 @@ class MovingBed {
         decomposition_(Comm::self(), bed.cells, bed.size, {false, false, false}, 1),
         grid_(decomposition_),
         halo_(decomposition_, grid_, timer_),
-        simple_(decomposition_, grid_, halo_, setup(bed), timer_),
+        solver_(decomposition_, grid_, halo_, setup(bed), timer_),
         state_(grid_),
         exchange_(grid_) {
-    simple_.prepare(state_, 0);
+    solver_.prepare(state_, 0);
   }
 
   void move_particles() {
@@ -59,7 +59,7 @@ class MovingBed {
     }
   }
   GasOutcome step() {
-    GasOutcome outcome = simple_.advance(state_, &exchange_, time_, bed_.dt);
+    GasOutcome outcome = solver_.advance(state_, &exchange_, time_, bed_.dt);
     time_ += bed_.dt;
     return outcome;
   }
@@ -95,7 +95,7 @@ class MovingBed {
   Grid grid_;
   PhaseTimer timer_;
   Halo halo_;
-  Simple simple_;
+  GasSolver solver_;
   GasState state_;
   Exchange exchange_;
   double time_ = 0;

@@ -86,7 +86,7 @@ TEST(FixedBed, PressureDropIsErgunsExactly) {
     for (auto& side : setup.faces[0]) side = FreeSlip{};
     for (auto& side : setup.faces[2]) side = FreeSlip{};
     setup.faces[1] = {Inflow{{superficial, superficial, 0}, {}}, Outflow{0}};
-    Simple solver(decomposition, grid, halo, setup, timer);
+    GasSolver solver(decomposition, grid, halo, setup, timer);
     GasState gas(grid);
     Exchange exchange(grid);
     // The stated diameter makes drag; the volume that is deposited gives ε = 0.5.
@@ -127,7 +127,7 @@ TEST(Displacement, AMovingCloudDrivesTheGasThatItDisplaces) {
   Halo halo(decomposition, grid, timer);
   GasSetup setup{.density = 1, .viscosity = 1e-3, .gravity = {}, .tolerance = 1e-9, .pressure_tolerance = 1e-4};
   for (auto& pair : setup.faces) pair = {FreeSlip{}, FreeSlip{}};
-  Simple solver(decomposition, grid, halo, setup, timer);
+  GasSolver solver(decomposition, grid, halo, setup, timer);
   GasState gas(grid);
   const double volume = 0.05;
   Transfer transfer(decomposition, grid, halo, {.particle_volume = volume}, timer);

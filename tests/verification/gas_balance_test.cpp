@@ -21,7 +21,7 @@ TEST(GasMass, IsConservedInEveryCellToTheTolerance) {
   double sum = 0;
   box.for_cells([&](int i, int j, int k) { sum += std::abs(box.imbalance(i, j, k)); });
   EXPECT_LT(sum, 3 * setup.tolerance * throughput);  // 3: the solver's throughput counts three directions and storage
-  const GasBalance balance = box.simple.balance();
+  const GasBalance balance = box.solver.balance();
   EXPECT_NEAR(balance.in, throughput, 1e-12 * throughput);  // given, to round-off
   EXPECT_NEAR(balance.in, balance.out + balance.storage, 3 * setup.tolerance * throughput);
 }
@@ -140,7 +140,7 @@ TEST(Inflow, PatchAcrossCellsBringsExactlyItsFlow) {
   ASSERT_TRUE(box.step(1e-4).converged);
   const double area = (0.0277 - 0.0131) * (0.0159 - 0.0043), jet = 1 + 4 * 1e-4 / 0.5;  // the ramp at the step's end
   const double exact = 0.2 * (0.05 * 0.02 - area) + jet * area;
-  EXPECT_NEAR(box.simple.balance().in / exact, 1, 1e-13);  // round-off
+  EXPECT_NEAR(box.solver.balance().in / exact, 1, 1e-13);  // round-off
 }
 
 // A spout of 60 m/s that starts at once draws gas back in through the outflow beside it.
@@ -156,7 +156,7 @@ TEST(Outflow, GasThatComesBackDoesNotRunAway) {
     for (int d = 0; d < 3; ++d)
       for_solved(box, d, [&](int i, int j, int k) { fastest = std::max(fastest, std::abs(box.state.velocity[d](i, j, k))); });
     EXPECT_LT(fastest, 60 * 1.05);  // nothing pushes but the spout; the step's impulsive start a little
-    const GasBalance balance = box.simple.balance();
+    const GasBalance balance = box.solver.balance();
     EXPECT_NEAR(balance.in, balance.out, 3e-3 * balance.in);  // tolerance, counted over three directions
     came_back = came_back || balance.in > 1.1 * 60 * 0.022 * 0.012;
   }

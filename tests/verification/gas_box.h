@@ -6,7 +6,7 @@
 #include <functional>
 #include <string>
 
-#include "gas/simple.h"
+#include "gas/gas_solver.h"
 
 namespace bedflow {
 
@@ -16,17 +16,17 @@ struct GasBox {
       : decomposition(comm, cells, size, periodic, tall),
         grid(decomposition, ghosts_of(setup.convection)),
         halo(decomposition, grid, timer),
-        simple(decomposition, grid, halo, setup, timer),
+        solver(decomposition, grid, halo, setup, timer),
         state(grid),
         exchange(grid) {
-    simple.prepare(state, 0);
+    solver.prepare(state, 0);
   }
   GasBox(const GasBox&) = delete;
   GasBox& operator=(const GasBox&) = delete;
 
   // One step; with: whether the exchange with particles counts.
   GasOutcome step(double dt, bool with_exchange = false) {
-    GasOutcome outcome = simple.advance(state, with_exchange ? &exchange : nullptr, time, dt);
+    GasOutcome outcome = solver.advance(state, with_exchange ? &exchange : nullptr, time, dt);
     if (outcome.converged) time += dt;
     return outcome;
   }
@@ -67,7 +67,7 @@ struct GasBox {
   Grid grid;
   PhaseTimer timer;
   Halo halo;
-  Simple simple;
+  GasSolver solver;
   GasState state;
   Exchange exchange;
   double time = 0;
@@ -97,7 +97,7 @@ inline void set_fraction(GasBox& box, const std::function<double(double, double,
 }
 
 inline void for_solved(const GasBox& box, int d, const std::function<void(int, int, int)>& act) {
-  const Simple::Range range = box.simple.solved_faces(d);
+  const GasSolver::Range range = box.solver.solved_faces(d);
   Int3 low{0, 0, 0}, high = box.grid.cells;
   low[d] = range.low;
   high[d] = range.high + 1;
@@ -111,7 +111,7 @@ inline void fill_exchange(GasBox& box, double drag, double solids, Vec3 speed = 
   for (int d = 0; d < 3; ++d)
     for_solved(box, d, [&, d](int i, int j, int k) {
       const int at[3] = {i, j, k};
-      const bool half = at[d] == box.grid.cells[d] && box.simple.solved_faces(d).high == at[d];
+      const bool half = at[d] == box.grid.cells[d] && box.solver.solved_faces(d).high == at[d];
       box.exchange.drag[d](i, j, k) = drag * box.grid.cell_volume() * (half ? 0.5 : 1);
       box.exchange.drag_momentum[d](i, j, k) = box.exchange.drag[d](i, j, k) * speed[d];
       box.exchange.buoyancy[d](i, j, k) = solids;

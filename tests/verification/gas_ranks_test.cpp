@@ -23,7 +23,7 @@ void load(GasBox& box) {
     box.state.fraction(i, j, k) = 0.7 + 0.2 * std::sin(150 * x) * std::cos(100 * y) * std::cos(60 * z);
   });
   for (int d = 0; d < 3; ++d) {
-    const Simple::Range range = box.simple.solved_faces(d);
+    const GasSolver::Range range = box.solver.solved_faces(d);
     Int3 low{0, 0, 0}, high = g.cells;
     low[d] = range.low;
     high[d] = range.high + 1;
@@ -56,7 +56,7 @@ void expect_same_on_all_ranks(Scene scene) {
   });
   const Int3 first = part.grid.first;
   for (int d = 0; d < 3; ++d) {
-    const Simple::Range range = part.simple.solved_faces(d);
+    const GasSolver::Range range = part.solver.solved_faces(d);
     Int3 low{0, 0, 0}, high = part.grid.cells;
     low[d] = range.low;
     high[d] = range.high + 1;
@@ -70,7 +70,7 @@ void expect_same_on_all_ranks(Scene scene) {
     ASSERT_NEAR(part.state.pressure(i, j, k), whole.state.pressure(i + first[0], j + first[1], k + first[2]),
                 agreement * highest);
   });
-  EXPECT_NEAR(part.simple.balance().in, whole.simple.balance().in, agreement * (1e-6 + whole.simple.balance().in));
+  EXPECT_NEAR(part.solver.balance().in, whole.solver.balance().in, agreement * (1e-6 + whole.solver.balance().in));
 }
 
 TEST(GasRanks, BedBetweenInflowPatchAndOutflowIsTheSameOnAnyNumber) {

@@ -77,7 +77,7 @@ TEST(GasRestart, GoesOnWithTheSameBits) {
     }
   });
   resumed.time = through.time;
-  resumed.simple.prepare(state, resumed.time);
+  resumed.solver.prepare(state, resumed.time);
   for (int n = 0; n < 2; ++n) {
     ASSERT_TRUE(through.step(1e-3, true).converged);
     ASSERT_TRUE(resumed.step(1e-3, true).converged);
@@ -86,7 +86,7 @@ TEST(GasRestart, GoesOnWithTheSameBits) {
     for_solved(through, d,
                [&](int i, int j, int k) { ASSERT_EQ(state.velocity[d](i, j, k), through.state.velocity[d](i, j, k)); });
   through.for_cells([&](int i, int j, int k) { ASSERT_EQ(state.pressure(i, j, k), through.state.pressure(i, j, k)); });
-  EXPECT_EQ(resumed.simple.balance().out, through.simple.balance().out);
+  EXPECT_EQ(resumed.solver.balance().out, through.solver.balance().out);
 }
 
 // State, to the bit, and a reason that names what is wrong.

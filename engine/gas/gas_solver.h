@@ -1,4 +1,4 @@
-// The gas by SIMPLE on the staggered grid (Patankar 1980; multiphase form Syamlal 1998).
+// The gas on the staggered grid, by SIMPLE (simple.cpp) or by projection (projection.cpp).
 //
 //   ∂ε/∂t + ∇·(ε U) = 0
 //   ρg ε DU/Dt = −ε_b ∇p + ∇·σ + Σ b (V − U)/cell + ρg ε_b g,     σ = μ(∇U + ∇Uᵀ) − (2/3) μ (∇·U) I
@@ -19,18 +19,21 @@
 
 namespace bedflow {
 
+enum class GasMethod { simple, projection };
+
 struct GasSetup {
+  GasMethod method = GasMethod::simple;
   double density = 0;                              // ρg, kg/m³
   double viscosity = 0;                            // μ, Pa·s
   Vec3 gravity;                                    // m/s²
   std::array<std::array<Boundary, 2>, 3> faces{};  // [direction][low, high]; ignored where periodic
   Convection convection{};                         // the grid needs ghosts_of(convection) layers
-  double pressure_relaxation = 0.8;
+  double pressure_relaxation = 0.8;                // of SIMPLE, like the next three
   double velocity_relaxation = 0.5;
   int min_iterations = 2;
   int max_iterations = 500;
-  double tolerance = 1e-3;                                    // of the normalised residuals
-  double pressure_tolerance = 1e-2;                           // reduction in each linear solve of the pressure correction
+  double tolerance = 1e-3;           // of the normalised residuals, and what a projection's momentum solve leaves
+  double pressure_tolerance = 1e-2;  // reduction in a linear solve of the pressure
   Preconditioner preconditioner = Preconditioner::incomplete_cholesky;  // of those solves
 };
 
@@ -65,10 +68,12 @@ struct GasBalance {
   double in = 0, out = 0, storage = 0;
 };
 
-class Simple {
+struct GasStep;  // gas_step.h
+
+class GasSolver {
  public:
-  Simple(const Decomposition& decomposition, const Grid& grid, Halo& halo, const GasSetup& setup, PhaseTimer& timer);
-  ~Simple();
+  GasSolver(const Decomposition& decomposition, const Grid& grid, Halo& halo, const GasSetup& setup, PhaseTimer& timer);
+  ~GasSolver();
 
   // Fills boundary faces and ghosts for the state at time 0 (s).
   void prepare(GasState& state, double time);
@@ -87,8 +92,7 @@ class Simple {
   Range solved_faces(int d) const;
 
  private:
-  struct Work;
-  std::unique_ptr<Work> work_;
+  std::unique_ptr<GasStep> step_;
 };
 
 }  // namespace bedflow

@@ -1,0 +1,170 @@
+#include "gas/gas_solver.h"
+
+#include <array>
+#include <cmath>
+
+#include "gas/gas_step.h"
+
+namespace bedflow {
+
+namespace {
+
+GasSetup unrelaxed(GasSetup setup) {
+  setup.velocity_relaxation = setup.pressure_relaxation = 1;
+  return setup;
+}
+
+}  // namespace
+
+// ------------------------------------------------------------------------------------------------ what both ways share
+
+GasStep::GasStep(const Decomposition& given_decomposition, const Grid& given_grid, Halo& given_halo, const GasSetup& given_setup,
+                 PhaseTimer& given_timer)
+    : decomposition(given_decomposition),
+      grid(given_grid),
+      halo(given_halo),
+      setup(given_setup.method == GasMethod::simple ? given_setup : unrelaxed(given_setup)),
+      timer(given_timer),
+      boundaries(decomposition, grid, setup.faces),
+      momentum(decomposition, grid, halo, setup, boundaries),
+      pressure(decomposition, grid, halo, boundaries, setup.preconditioner),
+      old_velocity(grid),
+      old_pressure(grid) {}
+
+void GasStep::set_boundaries(GasState& state, double time, bool pressure_on_face) {
+  boundaries.continue_field(state.fraction);
+  halo.fill(state.fraction);
+  boundaries.set_normal_velocity(state.velocity, state.fraction, time);
+  boundaries.set_velocity_beyond(state.velocity);
+  halo.fill(state.velocity);
+  boundaries.set_pressure(state.pressure, pressure_on_face);
+  halo.fill(state.pressure);
+}
+
+void GasStep::measure(const GasState& state) {
+  std::array<double, 4> sums{};  // in, out, storage, displacement
+  const double* epsilon = state.fraction.data();
+  for (int d = 0; d < 3; ++d)
+    for (int side = 0; side < 2; ++side) {
+      if (!boundaries.at(d, side)) continue;
+      const double* u = state.velocity[d].data();
+      const double inward = side == 0 ? grid.face_area(d) : -grid.face_area(d);
+      const std::ptrdiff_t before = side == 0 ? 0 : grid.stride(d);
+      Int3 low{0, 0, 0}, high = grid.cells;
+      low[d] = side == 0 ? 0 : grid.cells[d];
+      high[d] = low[d] + 1;
+      for_rows(grid, low, high, [&](auto first, int n) {
+        for (auto c = first; c < first + n; ++c) {
+          const double entering = inward * epsilon[c - before] * u[c];
+          sums[entering > 0 ? 0 : 1] += std::abs(entering);
+        }
+      });
+    }
+  const double* rate = state.fraction_rate.data();
+  for_rows(grid, [&](auto first, int n) {
+    for (auto c = first; c < first + n; ++c) {
+      sums[2] += grid.cell_volume() * rate[c];
+      sums[3] += grid.cell_volume() * std::abs(rate[c]);
+    }
+  });
+  decomposition.comm().sum(sums);
+  balance = {sums[0], sums[1], sums[2]};
+  displacement = sums[3];
+}
+
+// The second term: ∂ε/∂t comes from the difference of two ε, each right to round-off.
+std::string GasStep::closed_box_fault(double dt) const {
+  if (boundaries.open()) return {};
+  const double net = balance.in - balance.out - balance.storage;
+  const Vec3 size = decomposition.size();
+  const double allowed = setup.tolerance * (balance.in + balance.out + displacement) + 1e-12 * size.x * size.y * size.z / dt;
+  if (std::abs(net) <= allowed) return {};
+  if (!std::isfinite(net)) return "the gas fraction or its rate of change is not finite";
+  return join("the box has no outflow and cannot balance: inflow ", balance.in - balance.out,
+              " m3/s, growth of the gas volume (d eps/dt) ", balance.storage, " m3/s; make one face an outflow");
+}
+
+std::string GasStep::begin(const GasState& state, const Exchange* exchange, double dt) {
+  const PhaseTimer::Scope scope(timer, Phase::momentum);
+  const bool sound = momentum.begin(state, old_velocity, exchange, dt);
+  if (!decomposition.comm().any(!sound)) return {};
+  return "the gas fraction at the step's start, or the gas share of the pressure force (1 - buoyancy), is not positive in some "
+         "cell";
+}
+
+Momentum::Sums GasStep::assemble(const GasState& state) {
+  const PhaseTimer::Scope scope(timer, Phase::momentum, static_cast<std::uint64_t>(grid.interior()));
+  Momentum::Sums all = momentum.assemble(state);
+  std::array<double, 3> sums{all.imbalance, all.force, all.throughput};
+  decomposition.comm().sum(sums);
+  all.coupling = decomposition.comm().max(all.coupling);
+  all.imbalance = sums[0];
+  all.force = sums[1];
+  all.throughput = sums[2] + displacement;
+  return all;
+}
+
+double GasStep::solve_momentum(GasState& state, double coupling, double leave) {
+  const PhaseTimer::Scope scope(timer, Phase::momentum);
+  return momentum.solve(state.velocity, coupling, leave);
+}
+
+PressureCorrection::Result GasStep::correct(GasState& state, double enough, double share) {
+  const PhaseTimer::Scope scope(timer, Phase::pressure, static_cast<std::uint64_t>(grid.interior()));
+  pressure.assemble(momentum.fraction(), momentum.mobility());
+  pressure.set_imbalance(momentum.fraction(), state.velocity, state.fraction_rate);
+  const double cells = static_cast<double>(grid.global[0]) * grid.global[1] * grid.global[2];
+  const auto result = pressure.solve(setup.pressure_tolerance, enough / cells);
+  pressure.correct(state.velocity, state.pressure, momentum.mobility(), share);
+  boundaries.set_velocity_beyond(state.velocity);
+  halo.fill(state.velocity);
+  halo.fill(state.pressure);
+  return result;
+}
+
+// ------------------------------------------------------------------------------------------------ one step
+
+GasSolver::GasSolver(const Decomposition& decomposition, const Grid& grid, Halo& halo, const GasSetup& setup, PhaseTimer& timer)
+    : step_(std::make_unique<GasStep>(decomposition, grid, halo, setup, timer)) {}
+
+GasSolver::~GasSolver() = default;
+
+void GasSolver::prepare(GasState& state, double time) {
+  step_->set_boundaries(state, time, false);
+  step_->measure(state);
+}
+
+GasOutcome GasSolver::advance(GasState& state, const Exchange* exchange, double time, double dt) {
+  GasStep& w = *step_;
+  w.old_velocity = state.velocity;
+  w.old_pressure = state.pressure;
+  const GasBalance old_balance = w.balance;
+  GasOutcome outcome;
+  w.set_boundaries(state, time + dt, true);
+  w.measure(state);
+  outcome.reason = w.closed_box_fault(dt);
+  if (outcome.reason.empty()) outcome.reason = w.begin(state, exchange, dt);
+  if (outcome.reason.empty()) {
+    outcome = w.setup.method == GasMethod::simple ? w.simple(state) : w.projection(state);
+  }
+  if (!outcome.converged) {
+    state.velocity = w.old_velocity;
+    state.pressure = w.old_pressure;
+    w.balance = old_balance;
+    return outcome;
+  }
+  w.boundaries.set_pressure(state.pressure, false);
+  w.halo.fill(state.pressure);
+  w.measure(state);
+  return outcome;
+}
+
+GasBalance GasSolver::balance() const {
+  return step_->balance;
+}
+
+GasSolver::Range GasSolver::solved_faces(int d) const {
+  return {step_->boundaries.first_solved(d), step_->boundaries.last_solved(d)};
+}
+
+}  // namespace bedflow
