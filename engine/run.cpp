@@ -152,7 +152,7 @@ class Run {
 
   Stop advance_to_end() {
     while (!simulation_->finished()) {
-      simulation_->step();
+      step();
       count_step();
       {
         const PhaseTimer::Scope scope(timer_, Phase::statistics, simulation_->particle_count());
@@ -231,6 +231,13 @@ class Run {
     return by_steps || by_time || by_wall;
   }
 
+  void step() {
+    const double start = wall_seconds();
+    const Traffic before = comm_.traffic();
+    simulation_->step();
+    totals_.traffic += comm_.traffic() - before;
+    totals_.step_seconds += wall_seconds() - start;
+  }
   void count_step() {
     ++totals_.steps;
     totals_.simulated_seconds += simulation_->last_step();

@@ -1,5 +1,6 @@
 #include "summary.h"
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <fstream>
@@ -12,12 +13,17 @@ namespace {
 
 using nlohmann::json;
 
-// Seconds of each phase and of the whole, of this rank.
-std::array<double, phase_count + 1> seconds_of(const PhaseTimer& timer) {
-  std::array<double, phase_count + 1> seconds{};
-  for (int phase = 0; phase < phase_count; ++phase) seconds[phase] = timer[static_cast<Phase>(phase)].seconds;
-  seconds[phase_count] = timer.seconds();
-  return seconds;
+// What this rank tells: the seconds of each phase, then the rest by name.
+enum Told { wall = phase_count, in_steps, communication, messages, bytes, told };
+std::array<double, told> costs_of(const PhaseTimer& timer, const RunTotals& totals) {
+  std::array<double, told> costs{};
+  for (int phase = 0; phase < phase_count; ++phase) costs[phase] = timer[static_cast<Phase>(phase)].seconds;
+  costs[wall] = timer.seconds();
+  costs[in_steps] = totals.step_seconds;
+  costs[communication] = totals.traffic.seconds;
+  costs[messages] = static_cast<double>(totals.traffic.messages);
+  costs[bytes] = static_cast<double>(totals.traffic.bytes);
+  return costs;
 }
 
 bool is_gas(Phase phase) {
@@ -48,16 +54,25 @@ json phase_entry(const char* unit, double seconds, double units) {
 
 void write_summary(const Comm& comm, const std::filesystem::path& path, const Plan& plan, const PhaseTimer& timer,
                    const RunTotals& totals) {
-  const auto mine = seconds_of(timer);
+  const auto mine = costs_of(timer, totals);
   const std::vector<double> all = comm.gather_all(mine);
   if (!comm.root()) return;
 
   const auto particle_substeps = static_cast<double>(totals.particle_substeps),
              cell_steps = static_cast<double>(totals.cell_steps);
   const double particle_steps = static_cast<double>(plan.particle_count) * static_cast<double>(totals.steps);
-  double gas = 0, transfer = 0, dem = 0, busy = 0;
+  double gas = 0, transfer = 0, dem = 0, busy = 0, steps = 0, talk = 0, most_work = 0;
   json phases, ranks = json::array();
-  for (int rank = 0; rank < comm.size(); ++rank) ranks.push_back({{"wall_seconds", all[rank * mine.size() + phase_count]}});
+  for (int rank = 0; rank < comm.size(); ++rank) {
+    const double* costs = all.data() + rank * mine.size();
+    ranks.push_back({{"wall_seconds", costs[wall]},
+                     {"communication_seconds", costs[communication]},
+                     {"messages", costs[messages]},
+                     {"message_bytes", costs[bytes]}});
+    steps += costs[in_steps];
+    talk += costs[communication];
+    most_work = std::max(most_work, costs[in_steps] - costs[communication]);
+  }
   for (int p = 0; p < phase_count; ++p) {
     const Phase phase = static_cast<Phase>(p);
     double seconds = 0;  // CPU seconds, all ranks
@@ -90,6 +105,8 @@ void write_summary(const Comm& comm, const std::filesystem::path& path, const Pl
                   {"per_rank", ranks}};
   if (particle_substeps > 0) summary["particle_substep_microseconds"] = dem * 1e6 / particle_substeps;
   if (cell_steps > 0) summary["gas_cell_step_microseconds"] = gas * 1e6 / cell_steps;
+  if (steps > 0) summary["communication_share"] = talk / steps;
+  if (steps > talk) summary["balance"] = most_work * comm.size() / (steps - talk);
   if (busy > 0) summary["gas_share"] = gas / busy;
   if (busy > 0) summary["transfer_share"] = transfer / busy;
   if (totals.simulated_seconds > 0) summary["cpu_seconds_per_simulated_second"] = busy / totals.simulated_seconds;

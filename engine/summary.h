@@ -19,10 +19,13 @@ struct RunTotals {
   std::uint64_t particle_substeps = 0;    // all ranks
   std::uint64_t cell_steps = 0;           // all ranks
   std::uint64_t list_rebuilds = 0, gas_iterations = 0, pressure_iterations = 0;
+  double step_seconds = 0;  // wall, of this rank in steps
+  Traffic traffic;          // of this rank in steps
 };
 
 // Collective; rank 0 writes. Wall seconds, steps, sub-steps, and seconds and nanoseconds per unit of work of every phase, per
-// rank and in total (the ranks' mean). Throws std::system_error on rank 0.
+// rank and in total (the ranks' mean); the share of communication (waiting included) in the steps, and their balance: the work of
+// the busiest rank over the ranks' mean, where work is what is not communication. Throws std::system_error on rank 0.
 void write_summary(const Comm& comm, const std::filesystem::path& path, const Plan& plan, const PhaseTimer& timer,
                    const RunTotals& totals);
 

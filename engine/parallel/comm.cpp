@@ -4,6 +4,7 @@
 #include <mpi.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cstdlib>
 #include <numeric>
 
@@ -11,15 +12,40 @@ namespace bedflow {
 
 struct Comm::Handle {
   MPI_Comm comm;
+  mutable Traffic traffic{};
 };
 
 namespace {
 
 constexpr int tag = 1;
 
-template <class T>
-T reduce(T value, MPI_Datatype type, MPI_Op op, MPI_Comm comm) {
-  MPI_Allreduce(MPI_IN_PLACE, &value, 1, type, op, comm);
+// Counts what MPI takes while it lives.
+class Counted {
+ public:
+  explicit Counted(Traffic& traffic) : traffic_(traffic) {}
+  ~Counted() { traffic_.seconds += std::chrono::duration<double>(Clock::now() - start_).count(); }
+  Counted(const Counted&) = delete;
+  Counted& operator=(const Counted&) = delete;
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  Traffic& traffic_;
+  Clock::time_point start_ = Clock::now();
+};
+
+Counted collective(Traffic& traffic) {
+  ++traffic.collectives;
+  return Counted(traffic);
+}
+Counted message(Traffic& traffic, int to, std::size_t bytes) {
+  if (to >= 0) ++traffic.messages, traffic.bytes += bytes;
+  return Counted(traffic);
+}
+
+template <class T, class Handle>
+T reduce(T value, MPI_Datatype type, MPI_Op op, const Handle& handle) {
+  const Counted counted = collective(handle.traffic);
+  MPI_Allreduce(MPI_IN_PLACE, &value, 1, type, op, handle.comm);
   return value;
 }
 
@@ -56,30 +82,32 @@ Comm Comm::self() {
 }
 
 double Comm::sum(double value) const {
-  return size_ == 1 ? value : reduce(value, MPI_DOUBLE, MPI_SUM, handle_->comm);
+  return size_ == 1 ? value : reduce(value, MPI_DOUBLE, MPI_SUM, *handle_);
 }
 std::int64_t Comm::sum(std::int64_t value) const {
-  return size_ == 1 ? value : reduce(value, MPI_INT64_T, MPI_SUM, handle_->comm);
+  return size_ == 1 ? value : reduce(value, MPI_INT64_T, MPI_SUM, *handle_);
 }
 double Comm::max(double value) const {
-  return size_ == 1 ? value : reduce(value, MPI_DOUBLE, MPI_MAX, handle_->comm);
+  return size_ == 1 ? value : reduce(value, MPI_DOUBLE, MPI_MAX, *handle_);
 }
 std::int64_t Comm::max(std::int64_t value) const {
-  return size_ == 1 ? value : reduce(value, MPI_INT64_T, MPI_MAX, handle_->comm);
+  return size_ == 1 ? value : reduce(value, MPI_INT64_T, MPI_MAX, *handle_);
 }
 double Comm::min(double value) const {
-  return size_ == 1 ? value : reduce(value, MPI_DOUBLE, MPI_MIN, handle_->comm);
+  return size_ == 1 ? value : reduce(value, MPI_DOUBLE, MPI_MIN, *handle_);
 }
 bool Comm::any(bool value) const {
   return max(static_cast<std::int64_t>(value)) != 0;
 }
 void Comm::sum(std::span<double> values) const {
   if (size_ == 1) return;
+  const Counted counted = collective(handle_->traffic);
   MPI_Allreduce(MPI_IN_PLACE, values.data(), static_cast<int>(values.size()), MPI_DOUBLE, MPI_SUM, handle_->comm);
 }
 
 std::int64_t Comm::sum_before(std::int64_t value) const {
   if (size_ == 1) return 0;
+  const Counted counted = collective(handle_->traffic);
   std::int64_t before = 0;
   MPI_Exscan(&value, &before, 1, MPI_INT64_T, MPI_SUM, handle_->comm);
   return rank_ == 0 ? 0 : before;
@@ -87,6 +115,7 @@ std::int64_t Comm::sum_before(std::int64_t value) const {
 
 void Comm::broadcast(std::span<std::byte> bytes, int from) const {
   if (size_ == 1) return;
+  const Counted counted = collective(handle_->traffic);
   MPI_Bcast(bytes.data(), static_cast<int>(bytes.size()), MPI_BYTE, from, handle_->comm);
 }
 std::string Comm::broadcast(const std::string& text, int from) const {
@@ -100,6 +129,7 @@ std::string Comm::broadcast(const std::string& text, int from) const {
 
 std::vector<std::byte> Comm::gather(std::span<const std::byte> mine) const {
   if (size_ == 1) return {mine.begin(), mine.end()};
+  const Counted counted = collective(handle_->traffic);
   int count = static_cast<int>(mine.size());
   std::vector<int> counts(root() ? size_ : 0);
   MPI_Gather(&count, 1, MPI_INT, counts.data(), 1, MPI_INT, 0, handle_->comm);
@@ -114,12 +144,14 @@ std::vector<std::byte> Comm::gather(std::span<const std::byte> mine) const {
 }
 std::vector<std::int64_t> Comm::gather_all(std::int64_t mine) const {
   if (size_ == 1) return {mine};
+  const Counted counted = collective(handle_->traffic);
   std::vector<std::int64_t> all(size_);
   MPI_Allgather(&mine, 1, MPI_INT64_T, all.data(), 1, MPI_INT64_T, handle_->comm);
   return all;
 }
 std::vector<double> Comm::gather_all(std::span<const double> mine) const {
   if (size_ == 1) return {mine.begin(), mine.end()};
+  const Counted counted = collective(handle_->traffic);
   const int count = static_cast<int>(mine.size());
   std::vector<int> counts(size_);
   MPI_Allgather(&count, 1, MPI_INT, counts.data(), 1, MPI_INT, handle_->comm);
@@ -135,6 +167,7 @@ void Comm::exchange(int to, std::span<const double> send, int from, std::vector<
     return;
   }
   if (size_ == 1) return receive.clear();
+  const Counted counted = message(handle_->traffic, to, send.size_bytes());
   MPI_Request request = MPI_REQUEST_NULL;
   if (to >= 0) MPI_Isend(send.data(), static_cast<int>(send.size()), MPI_DOUBLE, to, tag, handle_->comm, &request);
   receive.clear();
@@ -154,6 +187,7 @@ void Comm::exchange(int to, std::span<const double> send, int from, std::span<do
     return;
   }
   if (size_ == 1) return;
+  const Counted counted = message(handle_->traffic, to, send.size_bytes());
   MPI_Sendrecv(send.data(), static_cast<int>(send.size()), MPI_DOUBLE, to < 0 ? MPI_PROC_NULL : to, tag, receive.data(),
                static_cast<int>(receive.size()), MPI_DOUBLE, from < 0 ? MPI_PROC_NULL : from, tag, handle_->comm,
                MPI_STATUS_IGNORE);
@@ -161,6 +195,7 @@ void Comm::exchange(int to, std::span<const double> send, int from, std::span<do
 
 std::vector<std::vector<double>> Comm::exchange_all(const std::vector<std::vector<double>>& messages) const {
   if (size_ == 1) return messages;
+  const Counted counted = collective(handle_->traffic);
   std::vector<int> send_counts(size_), receive_counts(size_);
   std::vector<double> send, receive;
   for (int r = 0; r < size_; ++r) {
@@ -181,7 +216,12 @@ std::vector<std::vector<double>> Comm::exchange_all(const std::vector<std::vecto
 }
 
 void Comm::barrier() const {
-  if (size_ > 1) MPI_Barrier(handle_->comm);
+  if (size_ == 1) return;
+  const Counted counted = collective(handle_->traffic);
+  MPI_Barrier(handle_->comm);
+}
+Traffic Comm::traffic() const {
+  return handle_ ? handle_->traffic : Traffic{};
 }
 void Comm::abort(int exit_code) const {
   if (size_ > 1) MPI_Abort(handle_->comm, exit_code);

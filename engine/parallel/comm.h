@@ -20,6 +20,21 @@ class MpiSession {
   MpiSession& operator=(const MpiSession&) = delete;
 };
 
+// What a rank has said to others since its Comm was made.
+struct Traffic {
+  std::uint64_t messages = 0, bytes = 0;  // to one other rank
+  std::uint64_t collectives = 0;          // reductions, broadcasts, gathers, exchanges of all with all
+  double seconds = 0;                     // sending, receiving, waiting
+
+  Traffic& operator+=(const Traffic& b) {
+    messages += b.messages, bytes += b.bytes, collectives += b.collectives, seconds += b.seconds;
+    return *this;
+  }
+  friend Traffic operator-(const Traffic& a, const Traffic& b) {
+    return {a.messages - b.messages, a.bytes - b.bytes, a.collectives - b.collectives, a.seconds - b.seconds};
+  }
+};
+
 class Comm {
  public:
   static Comm world();
@@ -58,6 +73,7 @@ class Comm {
   std::vector<std::vector<double>> exchange_all(const std::vector<std::vector<double>>& messages) const;
 
   void barrier() const;
+  Traffic traffic() const;  // of all copies of this Comm together; nothing with one rank
   [[noreturn]] void abort(int exit_code) const;
 
  private:

@@ -120,5 +120,23 @@ TEST(Comm, ExchangeAllDeliversEveryMessage) {
   }
 }
 
+TEST(Comm, TrafficIsWhatWasSentToOthers) {
+  const Comm world = Comm::world();
+  const int next = (world.rank() + 1) % world.size(), previous = (world.rank() + world.size() - 1) % world.size();
+  const Traffic before = world.traffic();
+  const Comm copy = world;
+  const std::vector<double> sent(5, 1.0);
+  std::vector<double> received;
+  copy.exchange(next, sent, previous, received);
+  copy.exchange(-1, sent, -1, received);
+  copy.any(true);
+  const Traffic traffic = world.traffic() - before;
+  const bool others = world.size() > 1;
+  EXPECT_EQ(traffic.messages, others ? 1 : 0);
+  EXPECT_EQ(traffic.bytes, others ? 40 : 0);
+  EXPECT_EQ(traffic.collectives, others ? 1 : 0);
+  EXPECT_EQ(traffic.seconds > 0, others);
+}
+
 }  // namespace
 }  // namespace bedflow

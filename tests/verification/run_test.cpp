@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "bedflow/v1/job.pb.h"
@@ -150,6 +151,31 @@ TEST_F(JobRun, ASceneThatDoesNotFitIntoMemoryIsToldAsSuch) {
   const auto all = events(path);
   ASSERT_TRUE(!all.empty() && all.back().has_stopped());
   EXPECT_EQ(all.back().stopped().reason(), v1::OUT_OF_MEMORY);
+}
+
+TEST_F(JobRun, TheSummaryTellsBalanceAndCommunication) {
+  const auto path = fresh("told", short_bed());
+  ASSERT_EQ(run_in(path), Reason::finished);
+  std::ifstream file(path / "summary.json");
+  const auto summary = nlohmann::json::parse(file);
+  const double balance = summary.at("balance"), share = summary.at("communication_share");
+  double seconds = 0, messages = 0;
+  for (const auto& rank : summary.at("per_rank")) {
+    seconds += rank.at("communication_seconds").get<double>();
+    messages += rank.at("messages").get<double>();
+  }
+  if (comm.size() == 1) {
+    EXPECT_EQ(balance, 1);
+    EXPECT_EQ(share, 0);
+    EXPECT_EQ(messages, 0);
+  } else {
+    EXPECT_GT(balance, 1);
+    EXPECT_LE(balance, comm.size());
+    EXPECT_GT(share, 0);
+    EXPECT_LT(share, 1);
+    EXPECT_GE(messages, summary.at("substeps").get<double>());  // ghosts follow in every sub-step
+    EXPECT_LE(seconds, summary.at("wall_seconds").get<double>() * comm.size());
+  }
 }
 
 TEST_F(JobRun, EventsAreNumberedWithoutAGapOverAllAttempts) {
