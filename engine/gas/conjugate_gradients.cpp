@@ -79,8 +79,8 @@ double ConjugateGradients::multiply(const SevenPoint& matrix) {
   return row_sum_.total();
 }
 
-int ConjugateGradients::solve(const SevenPoint& matrix, bool singular, Field& b, Field& solution, double reduction,
-                              double target) {
+ConjugateGradients::Result ConjugateGradients::solve(const SevenPoint& matrix, bool singular, Field& b, Field& solution,
+                                                     double reduction, double target) {
   const Comm& comm = decomposition_.comm();
   double *x = solution.data(), *r = b.data(), *p = direction_.data();
   const double *z = preconditioned_.data(), *q = product_.data();
@@ -89,10 +89,10 @@ int ConjugateGradients::solve(const SevenPoint& matrix, bool singular, Field& b,
   if (singular) subtract_mean(b);
   double squares = dot(b, b), last = 0;
   target = std::max(target, reduction * reduction * squares);
-  int iterations = 0;
-  while (squares > target && iterations < most_iterations) {
+  Result result;
+  while (squares > target && result.iterations < most_iterations) {
     precondition(matrix, b, std::sqrt(squares / cells()));
-    const double now = dot(b, preconditioned_), turn = iterations == 0 ? 0 : now / last;
+    const double now = dot(b, preconditioned_), turn = result.iterations == 0 ? 0 : now / last;
     last = now;
     for_rows(grid_, [=](auto c, int n) {
 #pragma GCC ivdep
@@ -111,10 +111,11 @@ int ConjugateGradients::solve(const SevenPoint& matrix, bool singular, Field& b,
       }
     });
     squares = comm.sum(row_sum_.total());
-    ++iterations;
+    ++result.iterations;
   }
   if (singular) subtract_mean(solution);
-  return iterations;
+  result.reached = squares <= target;
+  return result;
 }
 
 }  // namespace bedflow

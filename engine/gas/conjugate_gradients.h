@@ -20,9 +20,13 @@ class ConjugateGradients {
 
   // What the preconditioner needs of a new matrix. Collective.
   void factor(const SevenPoint& matrix);
-  // A x = b from x = 0 until Σ(b − A x)² over all ranks has come down to `target` or to the square of `reduction` times what it
-  // was; b becomes the residual b − A x. x has no ghosts. Returns the number of iterations. Collective.
-  int solve(const SevenPoint& matrix, bool singular, Field& b, Field& x, double reduction, double target);
+  struct Result {
+    int iterations = 0;
+    bool reached = false;
+  };
+  // A x = b from x = 0 until Σ(b − A x)² over all ranks has come down to `target`, or to the square of `reduction` times what it
+  // was; b becomes the residual b − A x. x has no ghosts. Collective.
+  Result solve(const SevenPoint& matrix, bool singular, Field& b, Field& x, double reduction, double target);
 
  private:
   struct Identity {};

@@ -238,9 +238,9 @@ void Momentum::relax(int d, const double* u, Sums& sums) {
   sums.throughput += row_sums_[2].total() * grid_.face_area(d) / grid_.global[d];
 }
 
-// A sweep takes the error down to about coupling² of what it was.
+// A sweep takes the largest error down to `coupling` of what it was at least, and in the end to about its square.
 double Momentum::solve(FaceField& velocity, double coupling, double leave) {
-  const double each = 2 * std::log(std::clamp(coupling, 1e-3, 0.999));
+  const double each = std::log(std::clamp(coupling, 1e-3, 0.999));
   const int sweeps = std::clamp(static_cast<int>(std::ceil(std::log(leave) / each)), 1, most_sweeps);
   for (int n = 0; n < sweeps; ++n)
     for (int d = 0; d < 3; ++d) {

@@ -48,7 +48,9 @@ void PressureCorrection::set_imbalance(const FaceField& fraction, const FaceFiel
 PressureCorrection::Result PressureCorrection::solve(double reduction, double enough) {
   const double cells = static_cast<double>(grid_.global[0]) * grid_.global[1] * grid_.global[2];
   Result result;
-  result.iterations = solver_.solve(matrix_, !open_, residual_, correction_, reduction, enough * enough * cells);
+  const auto [iterations, reached] = solver_.solve(matrix_, !open_, residual_, correction_, reduction, enough * enough * cells);
+  result.iterations = iterations;
+  result.reached = reached;
   const double* r = residual_.data();
   double* partial = row_sum_.clear();
   for_rows(grid_, [=](auto c, int n) {

@@ -22,6 +22,7 @@ class PressureCorrection {
 
   struct Result {
     int iterations = 0;
+    bool reached = false;  // one of the two aims
     double imbalance = 0;  // Σ|what the cells lack after the correction| over all ranks, m³/s; not finite: it failed
   };
   // Until the residual has come down to `reduction` of the first, or its root mean square to `enough` (m³/s). Collective.

@@ -30,7 +30,7 @@ GasOutcome GasStep::projection(GasState& state) {
   outcome.iterations = 1;
   outcome.pressure_iterations = result.iterations;
   outcome.continuity_residual = result.imbalance == 0 ? 0 : result.imbalance / sums.throughput;
-  outcome.converged = outcome.continuity_residual <= setup.tolerance;
+  outcome.converged = std::isfinite(result.imbalance) && (result.reached || outcome.continuity_residual <= setup.tolerance);
   if (!outcome.converged) {
     outcome.reason = std::isfinite(outcome.continuity_residual)
                          ? join("the pressure solve left a residual of continuity of ", outcome.continuity_residual, " after ",

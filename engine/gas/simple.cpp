@@ -7,7 +7,7 @@
 namespace bedflow {
 
 GasOutcome GasStep::simple(GasState& state) {
-  constexpr double sweeps_leave = 0.1;  // of an error that the next iteration's coefficients change anyway
+  constexpr double sweeps_leave = 0.3;  // of an error that the next iteration's coefficients change anyway
   GasOutcome outcome;
   double continuity = 0;  // Σ|imbalance|, m³/s, after the last correction
   for (;; ++outcome.iterations) {

@@ -26,7 +26,7 @@ int iterations(const Kind& kind, const Comm& comm = Comm::self()) {
   ConjugateGradients solver(system.decomposition, system.grid, system.halo, Preconditioner::multigrid);
   solver.factor(system.matrix);
   Field x(system.grid);
-  return solver.solve(system.matrix, system.singular(), system.right, x, 1e-6, 0);
+  return solver.solve(system.matrix, system.singular(), system.right, x, 1e-6, 0).iterations;
 }
 
 TEST(Multigrid, IsSymmetric) {

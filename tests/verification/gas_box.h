@@ -1,6 +1,8 @@
 // A box of gas for the tests: decomposition, grid, halo, state and solver together.
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <array>
 #include <cmath>
 #include <functional>
@@ -80,6 +82,21 @@ inline GasSetup still_air() {
   setup.viscosity = 1.8e-5;
   for (auto& pair : setup.faces) pair = {FreeSlip{}, FreeSlip{}};
   return setup;
+}
+
+// Tests that hold whichever way the step is made.
+class EitherMethod : public testing::TestWithParam<GasMethod> {
+ protected:
+  // The setup by the method of the test; the one pressure solve of a projection does what many of SIMPLE do.
+  static GasSetup by_method(GasSetup setup) {
+    setup.method = GetParam();
+    if (setup.method == GasMethod::projection) setup.pressure_tolerance = std::max(1e-13, 0.01 * setup.tolerance);
+    return setup;
+  }
+};
+inline const auto either_method = testing::Values(GasMethod::simple, GasMethod::projection);
+inline std::string method_name(const testing::TestParamInfo<GasMethod>& info) {
+  return info.param == GasMethod::simple ? "simple" : "projection";
 }
 
 // Upright channel: inflow below, outflow above, walls beside.
