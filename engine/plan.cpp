@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <numbers>
 #include <sstream>
+#include <utility>
 
 #include "coupling/transfer.h"
 
@@ -47,9 +48,9 @@ double fastest_inflow(const GasScene& gas) {
   return fastest;
 }
 
-// Explicit exchange freezes b (U − V) over a gas step: V overshoots U beyond dt = 2m/b. b is taken at the floor of ε and at the
-// slip of the fastest inflow through it.
-double explicit_drag_limit(const Scene& scene) {
+// 2m/b, the time over which a frozen b (U − V) makes V overshoot U. b is taken at the floor of ε and at the slip of the fastest
+// inflow through it.
+double drag_limit(const Scene& scene) {
   const double fraction = scene.coupling->fraction_floor;
   const DragScene drag{scene.gas->setup.density, scene.gas->setup.viscosity, scene.particles->diameter};
   const double slip = fastest_inflow(*scene.gas) / fraction;
@@ -193,6 +194,7 @@ void plan_parts(Plan& plan) {
   if (scene.coupling) {
     add("drag law", true, std::visit([](const auto& law) { return std::string(law.name); }, scene.coupling->drag));
     add("kernel", true, kernel_text(scene));
+    add("exchange", true, std::visit([](const auto& scheme) { return std::string(scheme.name); }, scene.coupling->scheme));
     add("displacement of gas, ∂ε/∂t", scene.coupling->displacement,
         scene.coupling->displacement
             ? "default"
@@ -211,11 +213,17 @@ void check_coupling(Plan& plan) {
   if (!scene.coupling) return;
   plan.cell_ratio =
       std::cbrt(scene.size.x * scene.size.y * scene.size.z / static_cast<double>(plan.cell_count)) / scene.particles->diameter;
-  plan.drag_limit = explicit_drag_limit(scene);
-  if (plan.drag_limit > 0 && plan.step > plan.drag_limit) {
-    throw Stop(Reason::invalid_case, "coupling.explicit is unstable beyond dt = 2m/b = " + number(plan.drag_limit) +
-                                         " s (mass of a particle over the heaviest drag in sight), the gas step is " +
-                                         number(plan.step) + " s; set time.step below that");
+  plan.drag_limit = drag_limit(scene);
+  const auto [name, limited] =
+      std::visit([&](const auto& scheme) { return std::pair(std::string(scheme.name), scheme.limited(plan.step, plan.substep)); },
+                 scene.coupling->scheme);
+  if (plan.drag_limit > 0 && limited > plan.drag_limit) {
+    const bool frozen = std::holds_alternative<Explicit>(scene.coupling->scheme);
+    throw Stop(Reason::invalid_case, "coupling." + name + " is unstable beyond 2m/b = " + number(plan.drag_limit) +
+                                         " s (mass of a particle over the heaviest drag in sight), the " +
+                                         (frozen ? "gas step" : "sub-step") + " is " + number(limited) +
+                                         " s; choose coupling.semi_implicit, or " +
+                                         (frozen ? "set time.step below that" : "more particles.steps_per_collision"));
   }
   if (plan.cell_ratio < 1.5 || plan.cell_ratio > 5) {
     plan.warnings.push_back("cells of Δ* = " + number(plan.cell_ratio) + " diameters: about 2 is the field's rule");
@@ -263,7 +271,8 @@ std::string Plan::text() const {
   }
   line(scene.gas ? "gas step dt_CFD" : "step", number(step) + " s, not below " + number(shortest_step) + " s");
   if (cell_ratio > 0) line("cell over particle size", number(cell_ratio) + " (Δ*)");
-  if (drag_limit > 0) line("limit of explicit drag", number(drag_limit) + " s, " + number(drag_limit / step) + " times the step");
+  if (drag_limit > 0)
+    line("2m/b of the heaviest drag", number(drag_limit) + " s, " + number(drag_limit / step) + " times the step");
   line("steps", std::to_string(steps) + " to " + number(scene.end_time) + " s");
   line("cells", std::to_string(cell_count));
   line("particles", std::to_string(particle_count));

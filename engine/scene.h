@@ -11,6 +11,7 @@
 #include "gas/gas_solver.h"
 #include "models/contact.h"
 #include "models/drag.h"
+#include "models/exchange.h"
 #include "models/kernel.h"
 #include "models/tangential.h"
 #include "particles/dem.h"
@@ -51,6 +52,7 @@ struct ParticleScene {
 struct CouplingScene {
   Drag drag;
   Kernel kernel;
+  ExchangeScheme scheme;
   bool displacement = true;
   double fraction_floor = 0.35;
 };

@@ -25,7 +25,10 @@ DemSetup dem_setup(const Plan& plan) {
   setup.gravity = plan.scene.gravity;
   setup.skin = plan.skin;
   setup.sides = plan.scene.sides;
-  setup.gas = plan.scene.coupling.has_value();
+  if (plan.scene.coupling) {
+    setup.gas = std::visit([](const auto& scheme) { return scheme.relaxes ? GasForce::relaxed : GasForce::frozen; },
+                           plan.scene.coupling->scheme);
+  }
   std::visit(
       [&]<class Law>(const PairAndWall<Law>&) {
         setup.rotation = Law::rotation;
@@ -51,7 +54,10 @@ Simulation::CouplingPart::CouplingPart(const Decomposition& decomposition, const
                {.kernel = plan.scene.coupling->kernel,
                 .diameter = plan.scene.particles->diameter,
                 .particle_volume = plan.scene.particles->mass / plan.scene.particles->density,
-                .fraction_floor = plan.scene.coupling->fraction_floor},
+                .mass = plan.scene.particles->mass,
+                .gravity = plan.scene.gravity,
+                .fraction_floor = plan.scene.coupling->fraction_floor,
+                .scheme = plan.scene.coupling->scheme},
                timer),
       fraction_before(gas.grid) {}
 
@@ -74,7 +80,8 @@ Simulation::Simulation(const Plan& plan, const Comm& comm, PhaseTimer& timer)
 void Simulation::step() {
   double dt = std::min(step_size_, plan_.scene.end_time - time_);
   if (coupling_) deposit_volume();                                            // particles -> ε, ∂ε/∂t
-  if (coupling_) deposit_drag();                                              // b and bV -> faces
+  if (coupling_) find_drag();                                                 // U, ε -> b
+  if (coupling_) deposit_drag(dt);                                            // b and bV -> faces
   if (gas_) dt = advance_gas(dt);                                             // U, p
   if (coupling_) coupling_->transfer.sample(gas_->state, dem_->particles());  // U, ∇p -> F_g
   if (audit_exchange_) audit_exchange();
@@ -95,11 +102,18 @@ void Simulation::deposit_volume() {
   }
 }
 
-void Simulation::deposit_drag() {
+void Simulation::find_drag() {
   const DragScene scene{plan_.scene.gas->setup.density, plan_.scene.gas->setup.viscosity, plan_.scene.particles->diameter};
-  std::visit(
-      [&](const auto& law) { coupling_->transfer.deposit_drag(law, scene, dem_->particles(), gas_->state, coupling_->exchange); },
-      plan_.scene.coupling->drag);
+  std::visit([&](const auto& law) { coupling_->transfer.find_drag(law, scene, dem_->particles(), gas_->state); },
+             plan_.scene.coupling->drag);
+}
+
+void Simulation::deposit_drag(double dt) {
+  coupling_->transfer.deposit_drag(dem_->particles(), {dt, substeps_in(dt)}, coupling_->exchange);
+}
+
+int Simulation::substeps_in(double dt) const {
+  return std::max(1, static_cast<int>(std::ceil(dt / plan_.substep - 1e-9)));
 }
 
 // Takes the longest step up to dt that converges; returns it.
@@ -117,6 +131,7 @@ double Simulation::advance_gas(double dt) {
     notes_.push_back("step " + std::to_string(steps_ + 1) + ": dt cut from " + number(dt) + " to " + number(shorter) +
                      " s: " + gas_outcome_.reason);
     dt = step_size_ = shorter;
+    if (coupling_) deposit_drag(dt);  // what the gas is to lose depends on the step
     good_steps_ = 0;
   }
   if (step_size_ < plan_.step && ++good_steps_ >= steps_before_growth) {
@@ -140,11 +155,27 @@ void Simulation::audit_exchange() {
 }
 
 void Simulation::advance_particles(double dt) {
-  const int substeps = std::max(1, static_cast<int>(std::ceil(dt / plan_.substep - 1e-9)));
-  std::visit([&](const auto& contact, const auto& tangential) { dem_->advance(substeps, dt / substeps, contact, tangential); },
-             plan_.scene.particles->contact, plan_.scene.particles->tangential);
+  const int substeps = substeps_in(dt);
+  const auto advance = [&](int count) {
+    std::visit([&](const auto& contact, const auto& tangential) { dem_->advance(count, dt / substeps, contact, tangential); },
+               plan_.scene.particles->contact, plan_.scene.particles->tangential);
+  };
+  if (coupling_ && std::visit([](const auto& scheme) { return scheme.anew; }, plan_.scene.coupling->scheme)) {
+    for (int substep = 0; substep < substeps; ++substep) {
+      pull_anew();
+      advance(1);
+    }
+  } else {
+    advance(substeps);
+  }
   substeps_ += static_cast<std::uint64_t>(substeps);
   max_overlap_ = dem_->take_max_overlap();
+}
+
+void Simulation::pull_anew() {
+  coupling_->transfer.locate(dem_->particles());
+  find_drag();
+  coupling_->transfer.pull(gas_->state, dem_->particles());
 }
 
 bool Simulation::finished() const {
@@ -189,6 +220,7 @@ bool Simulation::settle() {
   const double speed = std::sqrt(2 * energy / (static_cast<double>(particle_count_) * plan_.scene.particles->mass));
   if (settled_time_ < settling.duration && (settled_time_ < plan_.fall_time || speed > settling.rest_velocity)) return true;
   if (coupling_) hidden_solids_ = coupling_->transfer.deposit_volume(dem_->particles(), gas_->state.fraction);
+  for (GasResponse& response : dem_->particles().gas_response) response = {};  // no gas has been felt
   return false;
 }
 

@@ -72,7 +72,10 @@ class Simulation {
   };
 
   void deposit_volume();
-  void deposit_drag();
+  void find_drag();
+  void deposit_drag(double dt);
+  void pull_anew();
+  int substeps_in(double dt) const;
   double advance_gas(double dt);
   void advance_particles(double dt);
   void audit_exchange();

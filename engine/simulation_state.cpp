@@ -99,6 +99,11 @@ CheckpointContent Simulation::checkpoint() const {
     if (dem_->setup().rotation) {
       content.arrays.push_back(rows("particles/spin", "rad/s", "angular velocities ω", store.spins()));
     }
+    if (dem_->setup().gas == GasForce::relaxed) {
+      std::vector<Vec3> debts;
+      for (const GasResponse& response : store.gas_response) debts.push_back(response.debt);
+      content.arrays.push_back(rows("particles/gas_debt", "N·s", "received from the gas beyond what the gas has lost", debts));
+    }
     content.arrays.push_back({"particles/id", "", "identity, for life",
                               std::vector<std::int64_t>(store.id.begin(), store.id.begin() + static_cast<std::ptrdiff_t>(n)),
                               std::nullopt, 1});
@@ -176,6 +181,14 @@ void Simulation::restore_particles(const CheckpointReader& from) {
       from.has("particles/spin") ? vectors(from.rows("particles/spin")) : std::vector<Vec3>(positions.size());
   const std::vector<std::int64_t> ids = from.integer_rows("particles/id");
   for (std::size_t p = 0; p < ids.size(); ++p) store.add(ids[p], positions[p], velocities[p], spins[p]);
+  if (dem_->setup().gas == GasForce::relaxed) {
+    store.gas_force.resize(store.owned);
+    store.gas_response.resize(store.owned);
+    if (from.has("particles/gas_debt")) {
+      const std::vector<Vec3> debts = vectors(from.rows("particles/gas_debt"));
+      for (std::size_t p = 0; p < store.owned; ++p) store.gas_response[p].debt = debts[p];
+    }
+  }
   std::vector<Vec3> at_rebuild;
   if (same_ranks) at_rebuild = vectors(from.rows("particles/position_at_rebuild"));
   if (!same_ranks) store = redistribute(decomposition_, store);

@@ -177,6 +177,8 @@ CouplingScene coupling_scene(const v1::Coupling& from) {
   CouplingScene scene;
   scene.drag = drag(from);
   scene.kernel = kernel(from);
+  if (from.has_sub_stepped()) scene.scheme = SubStepped{};
+  if (from.has_semi_implicit()) scene.scheme = SemiImplicit{};
   scene.displacement = from.displacement();
   scene.fraction_floor = from.gas_fraction_floor();
   return scene;

@@ -2,9 +2,9 @@
 //
 // Explicit steps of ∂c/∂t = ∇·(D ∇c), a direction at a time, without flux through the faces of the box; m is the node volume:
 //   m_i c_i' = m_i c_i + α (c_{i+1} − c_i) + α (c_{i−1} − c_i),   α = D Δt/h² ≤ 1/6
-// They keep Σ m c and every constant. As an operator on amounts m c a step is the transpose of itself on values c: deposits, divided
-// by their node volume, and sampled fields go through the same call. n steps and the hat have the variance 2 α n h² + h²/6, the
-// hat's averaged over places; it is made σ². With α = 1/6 the fourth moment is a Gaussian's too.
+// They keep Σ m c and every constant. As an operator on amounts m c a step is the transpose of itself on values c: deposits,
+// divided by their node volume, and sampled fields go through the same call. n steps and the hat have the variance 2 α n h² +
+// h²/6, the hat's averaged over places; it is made σ². With α = 1/6 the fourth moment is a Gaussian's too.
 #pragma once
 
 #include <vector>

@@ -42,6 +42,8 @@ Transfer::Transfer(const Decomposition& decomposition, const Grid& grid, Halo& h
       grid_(grid),
       halo_(halo),
       setup_(setup),
+      relaxes_(std::visit([](const auto& scheme) { return scheme.relaxes; }, setup.scheme)),
+      weight_(setup.mass * setup.gravity),
       timer_(timer),
       lattices_(decomposition, grid),
       stencils_(stencils_for(kernel_points(setup.kernel, setup.diameter, grid.spacing), grid)),
@@ -56,14 +58,19 @@ Transfer::Transfer(const Decomposition& decomposition, const Grid& grid, Halo& h
 
 // ---------------------------------------------------------------------------------------------------- volume
 
+void Transfer::locate(const ParticleStore& particles) {
+  std::visit([&](auto& stencils, const auto& kernel) { stencils.locate(kernel, setup_.diameter, grid_, lattices_, particles); },
+             stencils_, setup_.kernel);
+}
+
 double Transfer::deposit_volume(const ParticleStore& particles, Field& fraction) {
   const PhaseTimer::Scope scope(timer_, Phase::deposit, particles.owned);
   fraction.fill(0);
   double* solids = fraction.data();
   const double share = setup_.particle_volume / grid_.cell_volume();
+  locate(particles);
   std::visit(
-      [&]<int points>(Stencils<points>& stencils, const auto& kernel) {
-        stencils.locate(kernel, setup_.diameter, grid_, lattices_, particles);
+      [&]<int points>(const Stencils<points>& stencils) {
         for (std::size_t p = 0; p < particles.owned; ++p) {
           const auto shares = stencils[p];
           const double* x = stencils.x_shares(shares, cell_centres);
@@ -72,7 +79,7 @@ double Transfer::deposit_volume(const ParticleStore& particles, Field& fraction)
           });
         }
       },
-      stencils_, setup_.kernel);
+      stencils_);
   halo_.add(fraction);
   if (smoothing_) smoothing_->apply(fraction, cell_centres);
 
@@ -135,19 +142,48 @@ void Transfer::slips(const ParticleStore& particles, const FaceField& velocity, 
       stencils_);
 }
 
-// b, bV and buoyancy of every particle to the points around it.
+template <class Drag>
+void Transfer::find_drag(const Drag& drag, const DragScene& scene, const ParticleStore& particles, const GasState& gas) {
+  const PhaseTimer::Scope scope(timer_, Phase::deposit, particles.owned);
+  slips(particles, felt_velocity(gas.velocity), gas.fraction);
+  drag_.resize(particles.owned);
+  const double *slip = slip_.data(), *fraction = fraction_.data();
+  double* b = drag_.data();
+#pragma GCC ivdep
+  for (std::size_t p = 0; p < particles.owned; ++p) b[p] = drag(scene, slip[p], fraction[p]);
+}
+
+template void Transfer::find_drag(const GidaspowBlended&, const DragScene&, const ParticleStore&, const GasState&);
+template void Transfer::find_drag(const Gidaspow&, const DragScene&, const ParticleStore&, const GasState&);
+template void Transfer::find_drag(const WenYu&, const DragScene&, const ParticleStore&, const GasState&);
+template void Transfer::find_drag(const Ergun&, const DragScene&, const ParticleStore&, const GasState&);
+template void Transfer::find_drag(const SchillerNaumann&, const DragScene&, const ParticleStore&, const GasState&);
+template void Transfer::find_drag(const DiFelice&, const DragScene&, const ParticleStore&, const GasState&);
+template void Transfer::find_drag(const SyamlalObrien&, const DragScene&, const ParticleStore&, const GasState&);
+template void Transfer::find_drag(const KochHill&, const DragScene&, const ParticleStore&, const GasState&);
+template void Transfer::find_drag(const Beetstra&, const DragScene&, const ParticleStore&, const GasState&);
+template void Transfer::find_drag(const Tenneti&, const DragScene&, const ParticleStore&, const GasState&);
+template void Transfer::find_drag(const ConstantDrag&, const DragScene&, const ParticleStore&, const GasState&);
+
+// b, bV and buoyancy of every particle to the points around it, as the gas is to lose them.
 void Transfer::spread(const ParticleStore& particles, Exchange& exchange) {
   const double share = setup_.particle_volume / grid_.cell_volume();
+  paid_ = {};
   std::visit(
       [&]<int points>(const Stencils<points>& stencils) {
         for (std::size_t p = 0; p < particles.owned; ++p) {
           const auto shares = stencils[p];
-          const Vec3 velocity = particles.velocity(p);
-          const double b = drag_[p];
+          const double felt = relaxes_ ? felt_[p] : 1, b = felt * drag_[p];
+          Vec3 momentum = b * particles.velocity(p);
+          if (relaxes_) {
+            const Vec3 debt = (1 / step_.dt) * particles.gas_response[p].debt;
+            momentum += (1 - felt) * weight_ - debt;
+            paid_ += debt;
+          }
           for (int d = 0; d < 3; ++d) {
             if (!lattices_.has_faces(d)) continue;
             Share along[points];
-            for (int q = 0; q < points; ++q) along[q] = stencils.x_shares(shares, d)[q] * Share{b, b * velocity[d], share, 0};
+            for (int q = 0; q < points; ++q) along[q] = stencils.x_shares(shares, d)[q] * Share{b, momentum[d], felt * share, 0};
             Share* to = shares_[d].data();
             stencils.each_row(shares, d, [&](std::ptrdiff_t at, double weight) {
               for (int q = 0; q < points; ++q) to[at + q] += weight * along[q];
@@ -208,31 +244,21 @@ void Transfer::per_node_volume(Exchange& exchange) {
   halo_.fill(exchange.buoyancy);
 }
 
-template <class Drag>
-void Transfer::deposit_drag(const Drag& drag, const DragScene& scene, const ParticleStore& particles, const GasState& gas,
-                            Exchange& exchange) {
+void Transfer::deposit_drag(const ParticleStore& particles, const GasStep& step, Exchange& exchange) {
   const PhaseTimer::Scope scope(timer_, Phase::deposit, particles.owned);
-  slips(particles, felt_velocity(gas.velocity), gas.fraction);
-  drag_.resize(particles.owned);
-  const double *slip = slip_.data(), *fraction = fraction_.data();
-  double* b = drag_.data();
-#pragma GCC ivdep
-  for (std::size_t p = 0; p < particles.owned; ++p) b[p] = drag(scene, slip[p], fraction[p]);
+  step_ = step;
+  if (relaxes_) {
+    felt_.resize(particles.owned);
+    std::visit(
+        [&](const auto& scheme) {
+          for (std::size_t p = 0; p < particles.owned; ++p)
+            felt_[p] = scheme.felt(drag_[p] * step.dt / setup_.mass, step.substeps);
+        },
+        setup_.scheme);
+  }
   spread(particles, exchange);
   per_node_volume(exchange);
 }
-
-template void Transfer::deposit_drag(const GidaspowBlended&, const DragScene&, const ParticleStore&, const GasState&, Exchange&);
-template void Transfer::deposit_drag(const Gidaspow&, const DragScene&, const ParticleStore&, const GasState&, Exchange&);
-template void Transfer::deposit_drag(const WenYu&, const DragScene&, const ParticleStore&, const GasState&, Exchange&);
-template void Transfer::deposit_drag(const Ergun&, const DragScene&, const ParticleStore&, const GasState&, Exchange&);
-template void Transfer::deposit_drag(const SchillerNaumann&, const DragScene&, const ParticleStore&, const GasState&, Exchange&);
-template void Transfer::deposit_drag(const DiFelice&, const DragScene&, const ParticleStore&, const GasState&, Exchange&);
-template void Transfer::deposit_drag(const SyamlalObrien&, const DragScene&, const ParticleStore&, const GasState&, Exchange&);
-template void Transfer::deposit_drag(const KochHill&, const DragScene&, const ParticleStore&, const GasState&, Exchange&);
-template void Transfer::deposit_drag(const Beetstra&, const DragScene&, const ParticleStore&, const GasState&, Exchange&);
-template void Transfer::deposit_drag(const Tenneti&, const DragScene&, const ParticleStore&, const GasState&, Exchange&);
-template void Transfer::deposit_drag(const ConstantDrag&, const DragScene&, const ParticleStore&, const GasState&, Exchange&);
 
 // ---------------------------------------------------------------------------------------------------- back to the particles
 
@@ -251,9 +277,15 @@ void Transfer::sample(const GasState& gas, ParticleStore& particles) {
   } else {
     halo_.fill(gradient_);
   }
+  pull(gas, particles);
+  if (relaxes_) std::visit([&](const auto& scheme) { respond(scheme, particles); }, setup_.scheme);
+}
+
+// −𝒱∇p + b (U − V) at the places of the particles.
+void Transfer::pull(const GasState& gas, ParticleStore& particles) {
   const FaceField& velocity = felt_velocity(gas.velocity);
   std::visit(
-      [&]<int points>(const Stencils<points>& stencils) {
+      [&](const auto& stencils) {
         for (std::size_t p = 0; p < particles.owned; ++p) {
           const auto shares = stencils[p];
           const double b = drag_[p];
@@ -270,14 +302,32 @@ void Transfer::sample(const GasState& gas, ParticleStore& particles) {
       stencils_);
 }
 
+// What the gas has just lost is the particle's debt with the other sign; how the pull follows V.
+template <class Scheme>
+void Transfer::respond(const Scheme& scheme, ParticleStore& particles) {
+  for (std::size_t p = 0; p < particles.owned; ++p) {
+    Vec3& force = particles.gas_force[p];
+    GasResponse& response = particles.gas_response[p];
+    response.debt = -step_.dt * (felt_[p] * force - (1 - felt_[p]) * weight_);
+    for (int d = 0; d < 3; ++d)
+      if (!lattices_.has_faces(d)) response.debt[d] = 0;  // nothing but the walls can take it
+    response.drag = Scheme::anew ? 0 : drag_[p];
+    response.share = scheme.felt_in_substep(response.drag * step_.dt / step_.substeps / setup_.mass);
+    force += response.drag * particles.velocity(p);
+  }
+}
+
 ExchangeBalance Transfer::balance(const GasState& gas, const Exchange& exchange, const ParticleStore& particles) const {
   std::array<double, 9> sums{};  // lost x y z, received x y z, scale x y z
   for (int d = 0; d < 3; ++d) {
     // Without a face inside, nothing but the walls can take the particle's drag in this direction.
-    for (std::size_t p = 0; p < particles.owned && lattices_.has_faces(d); ++p) {
-      sums[3 + d] += particles.gas_force[p][d];
-      sums[6 + d] += std::abs(particles.gas_force[p][d]);
+    if (!lattices_.has_faces(d)) continue;
+    for (std::size_t p = 0; p < particles.owned; ++p) {
+      const double force = relaxes_ ? -particles.gas_response[p].debt[d] / step_.dt : particles.gas_force[p][d];
+      sums[3 + d] += force;
+      sums[6 + d] += std::abs(force);
     }
+    sums[3 + d] += paid_[d];
     lattices_.each_owned_row(d, [&](Int3 first, int n) {
       const std::ptrdiff_t c = grid_.index(first[0], first[1], first[2]);
       const auto node = lattices_.node_volume(d, first);

@@ -16,6 +16,7 @@
 #include "grid/grid.h"
 #include "grid/halo.h"
 #include "models/drag.h"
+#include "models/exchange.h"
 #include "models/kernel.h"
 #include "particles/dem.h"
 
@@ -31,7 +32,16 @@ struct TransferSetup {
   Kernel kernel{};
   double diameter = 0;           // of a particle, m
   double particle_volume = 0;    // m³
+  double mass = 0;               // kg; as gravity, for schemes that relax
+  Vec3 gravity{};                // m/s²
   double fraction_floor = 0.35;  // of ε
+  ExchangeScheme scheme{};
+};
+
+// What the particles do while the gas takes a step.
+struct GasStep {
+  double dt = 0;  // s
+  int substeps = 1;
 };
 
 // Force between gas and particles, summed over the box, N.
@@ -45,19 +55,27 @@ class Transfer {
   Transfer(const Decomposition& decomposition, const Grid& grid, Halo& halo, const TransferSetup& setup, PhaseTimer& timer);
 
   // ε at cell centres, ghosts and the cells beyond walls too. Returns the solids volume (m³, all ranks) that the floor hid.
-  // The particles stay where they are until the next call.
   double deposit_volume(const ParticleStore& particles, Field& fraction);
 
   // Beyond a face of the box a centre field is what it is in the cell inside.
   void mirror_at_faces(Field& field) const;
 
-  // b of every particle from U and ε at its place, and b, bV and its buoyancy to the faces.
-  template <class Drag>
-  void deposit_drag(const Drag& drag, const DragScene& scene, const ParticleStore& particles, const GasState& gas,
-                    Exchange& exchange);
+  // Where the particles are, for what follows; deposit_volume has done it.
+  void locate(const ParticleStore& particles);
 
-  // F_g = −𝒱 ∇p + b (U − V) of every particle into particles.gas_force, with the b of the last deposit_drag.
+  // b of every particle from U and ε at its place.
+  template <class Drag>
+  void find_drag(const Drag& drag, const DragScene& scene, const ParticleStore& particles, const GasState& gas);
+
+  // b, bV and buoyancy to the faces, as the gas is to lose them in the step, with what it still owes (models/exchange.h).
+  void deposit_drag(const ParticleStore& particles, const GasStep& step, Exchange& exchange);
+
+  // From the gas at the end of the step: F_g = −𝒱∇p + b (U − V) of every particle into gas_force, and for schemes that relax how
+  // it follows V into gas_response.
   void sample(const GasState& gas, ParticleStore& particles);
+
+  // The same force at the particles' new places and velocities within the step, after locate and find_drag.
+  void pull(const GasState& gas, ParticleStore& particles);
 
   // Sums what the gas lost in the step (from its own fields) and what the particles received. Collective.
   ExchangeBalance balance(const GasState& gas, const Exchange& exchange, const ParticleStore& particles) const;
@@ -67,6 +85,8 @@ class Transfer {
   // U as a particle feels it: that of the gas, or smoothed.
   const FaceField& felt_velocity(const FaceField& velocity);
   void slips(const ParticleStore& particles, const FaceField& velocity, const Field& fraction);
+  template <class Scheme>
+  void respond(const Scheme& scheme, ParticleStore& particles);
   void spread(const ParticleStore& particles, Exchange& exchange);
   void per_node_volume(Exchange& exchange);
   double gradient_at(const double* pressure, int d, std::ptrdiff_t at) const {
@@ -77,13 +97,17 @@ class Transfer {
   const Grid& grid_;
   Halo& halo_;
   TransferSetup setup_;
+  bool relaxes_;
+  Vec3 weight_;  // m g
   PhaseTimer& timer_;
   Lattices lattices_;
   std::optional<Smoothing> smoothing_;
   std::variant<Stencils<2>, Stencils<3>, Stencils<4>> stencils_;
-  std::vector<double> slip_, fraction_, drag_;  // of each owned particle: |U − V|, ε, b
-  std::array<std::vector<Share>, 3> shares_;    // of the faces of each direction, in a field's order; 0 between sweeps
-  FaceField gradient_;                          // ∇p as the particles feel it, Pa/m
+  GasStep step_;
+  std::vector<double> slip_, fraction_, drag_, felt_;  // of each owned particle: |U − V|, ε, b, ψ
+  Vec3 paid_;                                          // debts of this rank's particles that the gas pays in the step, N
+  std::array<std::vector<Share>, 3> shares_;           // of the faces of each direction, in a field's order; 0 between sweeps
+  FaceField gradient_;                                 // ∇p as the particles feel it, Pa/m
   FaceField buoyancy_share_;  // share of ∇p that acts on particles: 1 but where the floor limits the solids of a face
   FaceField smooth_velocity_;
 };

@@ -117,7 +117,8 @@ double Dem::kinetic_energy() const {
 
 void Dem::drop_ghosts() {
   particles_.resize(particles_.owned);
-  particles_.gas_force.resize(setup_.gas ? particles_.owned : 0);
+  particles_.gas_force.resize(setup_.gas != GasForce::none ? particles_.owned : 0);
+  particles_.gas_response.resize(setup_.gas == GasForce::relaxed ? particles_.owned : 0);
 }
 
 void Dem::forward_ghosts() {
@@ -156,6 +157,8 @@ void Dem::build_list() {
   std::vector<std::int32_t> heads;
   reorder(particles_.id, cells_.order(), ids);
   reorder(history_.heads(), cells_.order(), heads);
+  std::vector<GasResponse> responses;
+  reorder(particles_.gas_response, cells_.order(), responses);
 
   all_places_ = place_;
   {
@@ -258,8 +261,12 @@ void Dem::advance(int substeps, double dt, const PairAndWall<Contact>& contact, 
     {
       const PhaseTimer::Scope scope(timer_, Phase::integration, count);
       const double limit = 0.5 * setup_.skin;
-      far = setup_.gas ? integrate<rotation, true>(setup_, particles_, force_, torque_, place_, limit, dt)
-                       : integrate<rotation, false>(setup_, particles_, force_, torque_, place_, limit, dt);
+      const auto advance = [&]<GasForce gas> {
+        return integrate<rotation, gas>(setup_, particles_, force_, torque_, place_, limit, dt);
+      };
+      far = setup_.gas == GasForce::none     ? advance.template operator()<GasForce::none>()
+            : setup_.gas == GasForce::frozen ? advance.template operator()<GasForce::frozen>()
+                                             : advance.template operator()<GasForce::relaxed>();
     }
     keep_list_valid(far, dt);
   }

@@ -35,26 +35,35 @@ class Reader {
   const double* end_;
 };
 
-void put_particle(Message& message, const ParticleStore& store, std::size_t i, bool gas) {
+void put_particle(Message& message, const ParticleStore& store, std::size_t i, GasForce gas) {
   message.push_back(packed(store.id[i]));
   put(message, store.position(i));
   put(message, store.velocity(i));
   put(message, store.spin(i));
-  if (gas) put(message, store.gas_force[i]);
+  if (gas != GasForce::none) put(message, store.gas_force[i]);
+  if (gas == GasForce::relaxed) {
+    message.insert(message.end(), {store.gas_response[i].drag, store.gas_response[i].share});
+    put(message, store.gas_response[i].debt);
+  }
 }
 
-void take_particle(Reader& reader, ParticleStore& store, bool gas) {
+void take_particle(Reader& reader, ParticleStore& store, GasForce gas) {
   const std::int64_t id = reader.integer();
   const Vec3 position = reader.vector(), velocity = reader.vector(), spin = reader.vector();
   store.add(id, position, velocity, spin);
-  if (gas) store.gas_force.push_back(reader.vector());
+  if (gas != GasForce::none) store.gas_force.push_back(reader.vector());
+  if (gas == GasForce::relaxed) {
+    const double drag = reader.number(), share = reader.number();
+    store.gas_response.push_back({drag, share, reader.vector()});
+  }
 }
 
-void move_particle(ParticleStore& store, std::size_t from, std::size_t to, bool gas) {
+void move_particle(ParticleStore& store, std::size_t from, std::size_t to, GasForce gas) {
   store.rows[to] = store.rows[from];
   store.spin_z[to] = store.spin_z[from];
   store.id[to] = store.id[from];
-  if (gas) store.gas_force[to] = store.gas_force[from];
+  if (gas != GasForce::none) store.gas_force[to] = store.gas_force[from];
+  if (gas == GasForce::relaxed) store.gas_response[to] = store.gas_response[from];
 }
 
 // One stage: out of the block on one side of one direction.
@@ -73,7 +82,7 @@ class Stage {
 };
 
 // Moves the rows that leave into the message and closes the gaps, in order.
-void take_leaving(const Stage& stage, ParticleStore& store, ContactHistory& history, bool gas, Message& message) {
+void take_leaving(const Stage& stage, ParticleStore& store, ContactHistory& history, GasForce gas, Message& message) {
   std::size_t kept = 0;
   for (std::size_t i = 0; i < store.id.size(); ++i) {
     if (!stage.leaves(store.position(i))) {
@@ -94,11 +103,12 @@ void take_leaving(const Stage& stage, ParticleStore& store, ContactHistory& hist
     message[length_at] = packed(contacts);
   }
   store.resize(kept);
-  if (gas) store.gas_force.resize(kept);
+  if (gas != GasForce::none) store.gas_force.resize(kept);
+  if (gas == GasForce::relaxed) store.gas_response.resize(kept);
   history.heads().resize(kept);
 }
 
-void append(const Message& message, ParticleStore& store, ContactHistory& history, bool gas) {
+void append(const Message& message, ParticleStore& store, ContactHistory& history, GasForce gas) {
   for (Reader reader(message); reader;) {
     take_particle(reader, store, gas);
     const std::size_t row = history.append_particle();
@@ -128,7 +138,10 @@ void migrate(const Decomposition& decomposition, const DemSetup& setup, Particle
 
 ParticleStore redistribute(const Decomposition& decomposition, const ParticleStore& particles) {
   const Comm& comm = decomposition.comm();
-  const bool gas = comm.any(!particles.gas_force.empty());  // an empty rank cannot tell
+  const auto any_has = [&](const auto& rows) { return comm.any(!rows.empty()); };  // an empty rank cannot tell
+  const GasForce gas = any_has(particles.gas_response) ? GasForce::relaxed
+                       : any_has(particles.gas_force)  ? GasForce::frozen
+                                                       : GasForce::none;
   std::vector<Message> messages(comm.size());
   for (std::size_t i = 0; i < particles.owned; ++i)
     put_particle(messages[decomposition.owner(particles.position(i))], particles, i, gas);

@@ -17,15 +17,25 @@ struct alignas(64) ParticleRow {
   double spin_x = 0, spin_y = 0;  // ω, rad/s
 };
 
+// How the force of the gas follows a particle's velocity within a gas step, and what the gas has not lost yet.
+struct GasResponse {
+  double drag = 0;   // b, kg/s: the force is gas_force − b V
+  double share = 1;  // mean of that force over a sub-step over the force at its start: (1 − e^−z)/z, z = b dt/m
+  Vec3 debt;         // N·s received so far less what the gas loses for it
+};
+
+enum class GasForce { none, frozen, relaxed };  // over the sub-steps of a gas step
+
 // Sorted in space; owned particles first, then ghosts (copies of what other ranks, or other periodic images, own). A ghost across
 // a periodic face stands where its owner has it. Between rebuilds of the pair list an owned particle may leave its block, or the
 // box across a periodic face, by up to half a skin.
 struct ParticleStore {
   std::size_t owned = 0;
-  std::vector<ParticleRow> rows;  //    owned + ghosts
-  std::vector<double> spin_z;     //    owned + ghosts, rad/s
-  std::vector<std::int64_t> id;   //    owned + ghosts
-  std::vector<Vec3> gas_force;    // N  owned; frozen over the sub-steps of a gas step; empty without gas
+  std::vector<ParticleRow> rows;          //    owned + ghosts
+  std::vector<double> spin_z;             //    owned + ghosts, rad/s
+  std::vector<std::int64_t> id;           //    owned + ghosts
+  std::vector<Vec3> gas_force;            // N  owned; over the sub-steps of a gas step; empty without gas
+  std::vector<GasResponse> gas_response;  // owned; empty unless the force is relaxed
 
   Vec3& position(std::size_t i) { return rows[i].position; }
   Vec3& velocity(std::size_t i) { return rows[i].velocity; }
@@ -75,7 +85,7 @@ struct DemSetup {
   double skin = 0;                             // extra reach of the pair list, m
   bool rotation = false;                       // the tangential law makes the particles spin
   bool history = false;                        // the tangential law has a memory
-  bool gas = false;                            // gas_force is used
+  GasForce gas = GasForce::none;               // what of gas_force and gas_response is used
   std::array<std::array<Side, 2>, 3> sides{};  // [direction][low, high]
 
   double inertia() const { return 0.4 * mass * radius * radius; }

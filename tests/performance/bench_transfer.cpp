@@ -65,7 +65,8 @@ void transfer(benchmark::State& state, const Bed& bed, const Kernel& kernel = Ha
   const DragScene scene{1.2, 1.8e-5, bed.diameter};
   for (auto _ : state) {
     transfer.deposit_volume(store, gas.fraction);
-    transfer.deposit_drag(GidaspowBlended{}, scene, store, gas, exchange);
+    transfer.find_drag(GidaspowBlended{}, scene, store, gas);
+    transfer.deposit_drag(store, {}, exchange);
     transfer.sample(gas, store);
     benchmark::DoNotOptimize(store.gas_force.data());
   }

@@ -79,7 +79,7 @@ class Scene {
     result.skin = spheres.skin;
     result.rotation = Law::rotation;
     result.history = Law::history;
-    result.gas = gas;
+    result.gas = gas ? GasForce::frozen : GasForce::none;
     for (int d = 0; d < 3; ++d) result.sides[d] = {spheres.sides[d], spheres.sides[d]};
     return result;
   }

@@ -43,6 +43,7 @@ TEST(Laws, OfTheSchemaAreThoseOfTheCode) {
   EXPECT_EQ(arms(v1::Monitor::descriptor(), "quantity"), NamesOf<Statistic>::get());
   EXPECT_EQ(arms(v1::ParticleType::descriptor(), "sizes"), NamesOf<SizeLaw>::get());
   EXPECT_EQ(arms(v1::Coupling::descriptor(), "kernel"), NamesOf<Kernel>::get());
+  EXPECT_EQ(arms(v1::Coupling::descriptor(), "exchange"), NamesOf<ExchangeScheme>::get());
 }
 
 TEST(Laws, AnArmThatIsNotBuiltIsNotCounted) {

@@ -105,7 +105,8 @@ TEST(Transfer, WhatTheFloorHidesIsCounted) {
 TEST(Transfer, BoverAllFacesIsTheSumOverParticles) {
   each_kernel([](Bed bed, const char* name) {
     bed.transfer.deposit_volume(bed.particles, bed.gas.fraction);
-    bed.transfer.deposit_drag(ConstantDrag{0.25}, {}, bed.particles, bed.gas, bed.exchange);
+    bed.transfer.find_drag(ConstantDrag{0.25}, {}, bed.particles, bed.gas);
+    bed.transfer.deposit_drag(bed.particles, {}, bed.exchange);
     for (int d = 0; d < 3; ++d) {
       const auto node = [&](int face) {  // cells that the face stands for
         const int global = bed.grid.first[d] + face, n = bed.grid.global[d];
@@ -131,7 +132,8 @@ TEST(Transfer, BoverAllFacesIsTheSumOverParticles) {
 void expect_closed(Bed& bed, const char* name) {
   bed.transfer.deposit_volume(bed.particles, bed.gas.fraction);
   bed.stir_gas();
-  bed.transfer.deposit_drag(GidaspowBlended{}, {1.2, 1.8e-5, 0.1}, bed.particles, bed.gas, bed.exchange);
+  bed.transfer.find_drag(GidaspowBlended{}, {1.2, 1.8e-5, 0.1}, bed.particles, bed.gas);
+  bed.transfer.deposit_drag(bed.particles, {}, bed.exchange);
   bed.stir_gas();
   bed.transfer.sample(bed.gas, bed.particles);
   const ExchangeBalance balance = bed.transfer.balance(bed.gas, bed.exchange, bed.particles);
@@ -174,7 +176,8 @@ TEST(Transfer, ConstantsAreReproducedNextToWallsToo) {
     bed.gas.fraction.fill(0.4);
     for (int d = 0; d < 3; ++d) bed.gas.velocity[d].fill(3.0 + d);
     // Without density Ergun's b is 25π μ d (1 − ε)/ε: it tells ε.
-    bed.transfer.deposit_drag(Ergun{}, {0, 1 / (25 * std::numbers::pi), 1}, bed.particles, bed.gas, bed.exchange);
+    bed.transfer.find_drag(Ergun{}, {0, 1 / (25 * std::numbers::pi), 1}, bed.particles, bed.gas);
+    bed.transfer.deposit_drag(bed.particles, {}, bed.exchange);
     bed.transfer.sample(bed.gas, bed.particles);
     for (std::size_t p = 0; p < bed.particles.owned; ++p)
       for (int d = 0; d < 3; ++d)
@@ -190,7 +193,8 @@ TEST(Transfer, AUniformPressureGradientPushesEveryParticleAlike) {
     });
     bed.halo.fill(bed.gas.pressure);
     bed.transfer.deposit_volume(bed.particles, bed.gas.fraction);
-    bed.transfer.deposit_drag(ConstantDrag{0}, {}, bed.particles, bed.gas, bed.exchange);
+    bed.transfer.find_drag(ConstantDrag{0}, {}, bed.particles, bed.gas);
+    bed.transfer.deposit_drag(bed.particles, {}, bed.exchange);
     bed.transfer.sample(bed.gas, bed.particles);
     for (std::size_t p = 0; p < bed.particles.owned; ++p) {
       EXPECT_NEAR(bed.particles.gas_force[p].y / (50 * Bed::volume), 1, 1e-12) << name;  // differences of up to 100 Pa
@@ -217,7 +221,8 @@ double interpolation_error(const Kernel& kernel, int cells, double diameter) {
   for (int p = 0; p < 200; ++p) particles.add(p, {std::fmod(0.1 + p * 0.6180339887, 1), 0.5, 0.5}, {}, {});
   particles.gas_force.resize(200);
   transfer.deposit_volume(particles, gas.fraction);
-  transfer.deposit_drag(ConstantDrag{1}, {}, particles, gas, exchange);
+  transfer.find_drag(ConstantDrag{1}, {}, particles, gas);
+  transfer.deposit_drag(particles, {}, exchange);
   transfer.sample(gas, particles);
   double worst = 0;
   for (std::size_t p = 0; p < 200; ++p)
