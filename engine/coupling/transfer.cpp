@@ -244,7 +244,7 @@ void Transfer::per_node_volume(Exchange& exchange) {
   halo_.fill(exchange.buoyancy);
 }
 
-void Transfer::deposit_drag(const ParticleStore& particles, const GasStep& step, Exchange& exchange) {
+void Transfer::deposit_drag(const ParticleStore& particles, const Interval& step, Exchange& exchange) {
   const PhaseTimer::Scope scope(timer_, Phase::deposit, particles.owned);
   step_ = step;
   if (relaxes_) {

@@ -39,7 +39,7 @@ struct TransferSetup {
 };
 
 // What the particles do while the gas takes a step.
-struct GasStep {
+struct Interval {
   double dt = 0;  // s
   int substeps = 1;
 };
@@ -68,7 +68,7 @@ class Transfer {
   void find_drag(const Drag& drag, const DragScene& scene, const ParticleStore& particles, const GasState& gas);
 
   // b, bV and buoyancy to the faces, as the gas is to lose them in the step, with what it still owes (models/exchange.h).
-  void deposit_drag(const ParticleStore& particles, const GasStep& step, Exchange& exchange);
+  void deposit_drag(const ParticleStore& particles, const Interval& step, Exchange& exchange);
 
   // From the gas at the end of the step: F_g = −𝒱∇p + b (U − V) of every particle into gas_force, and for schemes that relax how
   // it follows V into gas_response.
@@ -103,7 +103,7 @@ class Transfer {
   Lattices lattices_;
   std::optional<Smoothing> smoothing_;
   std::variant<Stencils<2>, Stencils<3>, Stencils<4>> stencils_;
-  GasStep step_;
+  Interval step_;
   std::vector<double> slip_, fraction_, drag_, felt_;  // of each owned particle: |U − V|, ε, b, ψ
   Vec3 paid_;                                          // debts of this rank's particles that the gas pays in the step, N
   std::array<std::vector<Share>, 3> shares_;           // of the faces of each direction, in a field's order; 0 between sweeps

@@ -128,7 +128,7 @@ TEST(ReadyCases, CarryTheReferenceDataInSi) {
 }
 
 TEST(Presets, AreRefusedForWhatIsNotBuiltYetAndForNothingElse) {
-  const std::vector<std::string> garg{"coupling.sub_stepped", "time.longest_step"};
+  const std::vector<std::string> garg{"time.longest_step"};
   const std::map<std::string, std::vector<std::string>> expected{
       {"mfix-exa-2018", {}},
       {"mfix-garg-upwind", garg},

@@ -42,7 +42,7 @@ class Resume : public testing::TestWithParam<std::string> {};
 // Same binary, case and ranks give the same bits, run through or stopped and resumed.
 TEST_P(Resume, IsTheUninterruptedRunBitForBit) {
   const Comm world = Comm::world();
-  const Plan plan = make_plan(scene_of(world, small_bed(GetParam())), world.size());
+  const Plan plan = make_plan(scene_of(world, GetParam()), world.size());
   const TestFolder folder(world);
   PhaseTimer timer;
   Simulation through(plan, world, timer);
@@ -59,7 +59,11 @@ TEST_P(Resume, IsTheUninterruptedRunBitForBit) {
   run(resumed, 1);
   EXPECT_FALSE(state_of(resumed) == state_of(through));
 }
-INSTANTIATE_TEST_SUITE_P(EveryTangentialLaw, Resume, testing::Values(coulomb, spring, frictionless));
+INSTANTIATE_TEST_SUITE_P(EveryTangentialLaw, Resume,
+                         testing::Values(small_bed(coulomb), small_bed(spring), small_bed(frictionless)));
+INSTANTIATE_TEST_SUITE_P(ExchangesThatOwe, Resume,
+                         testing::Values(with(small_bed(frictionless), "explicit", "semi_implicit"),
+                                         with(small_bed(frictionless), "hat {} explicit", "gaussian {} sub_stepped")));
 
 struct Found {
   std::vector<Vec3> position;  // by id
