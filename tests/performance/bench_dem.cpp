@@ -94,9 +94,9 @@ double resident_bytes() {
 template <class Law>
 void memory(benchmark::State& state) {
   for (auto _ : state) {
-    const std::filesystem::path file = settled_bed_file(4, 2);
+    const std::filesystem::path file = settled_bed_file(1, 8);
     const double before = resident_bytes();
-    MovingBed<Law> moving(settled_bed(4, 2), true);
+    MovingBed<Law> moving(settled_bed(1, 8), true);
     while (moving.dem().rebuilds() == 0) moving.advance();
     state.counters["figure"] = (resident_bytes() - before) / moving.count();
   }

@@ -9,6 +9,7 @@ gas     the gas by itself, likewise
 transfer  between particles and gas, both ways, likewise
 bed     whole beds, by the engine's summary.json
 peers   ours against LAMMPS on the same bed, in turn (needs Debian's package lammps)
+scaling 1 and 2 ranks measured, up to 10 000 predicted by the cost model of scaling.py
 
 --record keeps the figures as this machine's baseline. The exit code is 1 when a figure is short of its target.
 """
@@ -16,6 +17,7 @@ import pathlib
 import sys
 
 import peers
+import scaling
 from measuring import Baseline, Figure, engine, line, machine, run, scratch, sweep
 
 # Figure -> (direction, limit).
@@ -30,6 +32,7 @@ TARGETS = {
     "dem/spring/memory": ("<=", 700),
     "transfer/mueller": ("<=", 0.10),
     "transfer/goldschmidt": ("<=", 0.10),
+    "dem/coulomb/two_ranks": (">=", 1.85),
     "peers/lammps/coulomb/settled": (">=", 3),
     "peers/lammps/coulomb/agitated": (">=", 3),
     "peers/lammps/spring/settled": (">=", 2.5),
@@ -44,6 +47,7 @@ def dem(bin_folder):
     yield from sweep(bin_folder, "dem", "(coulomb|spring)/million", repetitions=1)
     for law in ("frictionless", "coulomb", "spring"):
         yield from sweep(bin_folder, "dem", f"{law}/memory", repetitions=1)  # each in a process of its own
+    yield from scaling.two_ranks(bin_folder)
 
 
 def gas(bin_folder):
@@ -65,7 +69,7 @@ def bed(bin_folder, name="mueller", fluidized=0.25, measured=0.05):
     yield Figure(f"bed/{name}/cost", summary["cpu_seconds_per_simulated_second"], "CPU s per simulated s")
 
 
-GROUPS = {"dem": dem, "gas": gas, "transfer": transfer, "bed": bed, "peers": peers.against_lammps}
+GROUPS = {"dem": dem, "gas": gas, "transfer": transfer, "bed": bed, "peers": peers.against_lammps, "scaling": scaling.scaling}
 
 
 def main(arguments):

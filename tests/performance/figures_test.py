@@ -8,6 +8,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 import figures  # noqa: E402
 import measuring  # noqa: E402
 import peers  # noqa: E402
+import scaling  # noqa: E402
 from measuring import Baseline, Figure  # noqa: E402
 
 NO_BASELINE = Baseline(pathlib.Path("/nowhere"))
@@ -65,6 +66,38 @@ Neighbor list builds = 4
         self.assertAlmostEqual(read["figure"], 8.0)
         self.assertAlmostEqual(read["contacts"], 5.1)
         self.assertAlmostEqual(read["rebuild"], 175)
+
+
+class CostModel(unittest.TestCase):
+    def setUp(self):
+        self.model = object.__new__(scaling.Model)
+        self.model.__dict__.update(density=1e7, particle=5e-8, list=1e-9, contact=2e-8, across=0.3, pack=2e-9, bytes=72)
+        self.network = {"latency": 1e-6, "bandwidth": 1e9, "reduction": 1e-6}
+
+    def test_one_rank_only_computes(self):
+        time, talk = self.model.time(1, (0.1, 0.1), (0, 0), 1, self.network)
+        self.assertAlmostEqual(time, 1e5 * 5e-8)
+        self.assertEqual(talk, 0)
+
+    def test_ghosts_are_the_frame_around_a_column(self):
+        r = scaling.REACH
+        self.assertAlmostEqual(self.model.ghosts((0.1, 0.2), (1, 0)), 1e7 * r * 0.2)
+        self.assertAlmostEqual(self.model.ghosts((0.1, 0.2), (2, 2)), 1e7 * (2 * r * (0.1 + 0.2) + 4 * r * r))
+
+    def test_a_message_costs_latency_and_its_bytes(self):
+        ghosts = self.model.ghosts((0.1, 0.1), (1, 0))
+        _, talk = self.model.time(2, (0.1, 0.1), (1, 0), 1, self.network)
+        self.assertAlmostEqual(talk, 1e-6 + 1e-6 + 72 * ghosts / 1e9)
+
+    def test_efficiency_begins_at_one_falls_and_ends_where_a_column_is_narrower_than_the_reach(self):
+        of = [figure.value for figure in scaling.predictions(self.model, "strong", lambda ranks: 1e5, 1)]
+        self.assertAlmostEqual(of[0], 100)
+        possible = [value for value in of if value == value]
+        self.assertEqual(possible, sorted(possible, reverse=True))
+        self.assertLess(len(possible), len(of))
+
+    def test_columns_are_as_square_as_the_ranks_allow(self):
+        self.assertEqual([scaling.cuts(ranks) for ranks in (1, 2, 12, 10000)], [(1, 1), (1, 2), (3, 4), (100, 100)])
 
 
 if __name__ == "__main__":

@@ -43,11 +43,11 @@ struct Particle {
 template <class Law>
 class Scene {
  public:
-  Scene(const Comm& comm, Vec3 size, const Spheres& spheres, Int3 cells = {8, 8, 8}, bool gas = false)
+  Scene(const Comm& comm, Vec3 size, const Spheres& spheres, Int3 cells = {8, 8, 8}, bool gas = false, int tall = -1)
       : spheres_(spheres),
         decomposition_(
             comm, cells, size,
-            {spheres.sides[0] == Side::periodic, spheres.sides[1] == Side::periodic, spheres.sides[2] == Side::periodic}),
+            {spheres.sides[0] == Side::periodic, spheres.sides[1] == Side::periodic, spheres.sides[2] == Side::periodic}, tall),
         dem(decomposition_, setup(spheres, gas), timer) {}
 
   void place(const std::vector<PlacedSphere>& spheres) { take(seed_placed(decomposition_, spheres)); }
