@@ -41,7 +41,7 @@ double fastest_inflow(const GasScene& gas) {
   double fastest = 0;
   for (const auto& pair : gas.setup.faces)
     for (const Boundary& face : pair)
-      if (const Inflow* inflow = std::get_if<Inflow>(&face)) {
+      if (const Inflow* inflow = inflow_of(face)) {
         fastest = std::max({fastest, inflow->jet.velocity, inflow->jet.from});
         for (const Inflow::Patch& patch : inflow->patches) fastest = std::max({fastest, patch.jet.velocity, patch.jet.from});
       }
@@ -61,7 +61,8 @@ double drag_limit(const Scene& scene) {
 void plan_time(Plan& plan) {
   const Scene& scene = plan.scene;
   const double tau = scene.particles ? scene.particles->collision_time : 0;
-  plan.step = scene.longest_step.value_or(tau);
+  plan.step = scene.step.value_or(tau);
+  plan.longest_step = std::max(plan.step, scene.longest_step.value_or(plan.step));
   if (scene.particles) {
     plan.substep = std::min(plan.step, tau / scene.particles->steps_per_collision);
     plan.substeps = static_cast<int>(std::ceil(plan.step / plan.substep - 1e-9));
@@ -72,6 +73,32 @@ void plan_time(Plan& plan) {
     throw Stop(Reason::invalid_case, "time.shortest_step = " + number(plan.shortest_step) + " s is longer than the gas step of " +
                                          number(plan.step) + " s (time.step, or the collision time)");
   }
+}
+
+// Where what runs in time has its corners.
+void plan_corners(Plan& plan) {
+  const Scene& scene = plan.scene;
+  std::vector<double>& corners = plan.corners;
+  const auto add_schedule = [&](const Schedule& schedule) {
+    for (const Schedule::Instant& instant : schedule.instants) corners.push_back(instant.time);
+  };
+  const auto add = [&](const Inflow::Jet& jet) {
+    corners.push_back(jet.ramp);
+    add_schedule(jet.schedule);
+  };
+  if (scene.gas) {
+    for (const auto& pair : scene.gas->setup.faces)
+      for (const Boundary& face : pair)
+        if (const Inflow* inflow = inflow_of(face)) {
+          add(inflow->jet);
+          for (const Inflow::Patch& patch : inflow->patches) add(patch.jet);
+        }
+    for (const Drive& drive : scene.gas->setup.drive) add_schedule(drive.schedule);
+  }
+  std::erase_if(corners, [&](double time) { return time <= 0 || time >= scene.end_time; });
+  corners.push_back(scene.end_time);
+  std::sort(corners.begin(), corners.end());
+  corners.erase(std::unique(corners.begin(), corners.end()), corners.end());
 }
 
 void plan_seeds(Plan& plan) {
@@ -202,6 +229,18 @@ void plan_parts(Plan& plan) {
     if (!scene.coupling->displacement)
       plan.warnings.push_back("coupling.displacement is off: ∂ε/∂t is left out of the gas balance, which is wrong on purpose");
   }
+  if (scene.gas) {
+    const auto& setup = scene.gas->setup;
+    const bool driven = std::any_of(setup.drive.begin(), setup.drive.end(),
+                                    [](const Drive& drive) { return drive.pressure_drop || drive.mass_flux; });
+    add("driven periodic flow", driven, driven ? "gas.driving" : "not asked for");
+    add("panels in the box", !setup.panels.empty(), std::to_string(setup.panels.size()) + " in the case");
+    const bool limited = plan.longest_step > plan.step || scene.courant;
+    add("adaptive step", limited,
+        limited ? "up to " + number(plan.longest_step) + " s" +
+                      (scene.courant ? ", Courant number at most " + number(*scene.courant) : "")
+                : "cut by convergence only: neither time.longest_step nor time.courant is set");
+  }
   add("messages between ranks", plan.ranks > 1, plan.ranks > 1 ? std::to_string(plan.ranks) + " ranks" : "one rank");
   add("monitors", !scene.monitors.empty(), std::to_string(scene.monitors.size()) + " in the case");
   add("plot files", scene.plot_interval.has_value(),
@@ -238,6 +277,7 @@ Plan make_plan(const Scene& scene, int ranks) {
   plan.ranks = ranks;
   plan_space(plan);
   plan_time(plan);
+  plan_corners(plan);
   check_coupling(plan);
   plan_cost(plan);
   check_memory(plan);
@@ -270,6 +310,7 @@ std::string Plan::text() const {
     line("skin of the pair list", number(skin) + " m");
   }
   line(scene.gas ? "gas step dt_CFD" : "step", number(step) + " s, not below " + number(shortest_step) + " s");
+  if (corners.size() > 1) line("instants that steps end on", std::to_string(corners.size() - 1) + " before the end");
   if (cell_ratio > 0) line("cell over particle size", number(cell_ratio) + " (Δ*)");
   if (drag_limit > 0)
     line("2m/b of the heaviest drag", number(drag_limit) + " s, " + number(drag_limit / step) + " times the step");

@@ -19,16 +19,18 @@ struct Plan {
   Scene scene;
   int ranks = 1;
 
-  double step = 0;           // dt_CFD, the longest, s
-  double shortest_step = 0;  // s
-  double substep = 0;        // dt_DEM, the longest, s; 0 without particles
-  double skin = 0;           // m
-  Int3 cells{};              // of the decomposition: the gas grid's, or blocks wide enough for particles alone
-  Int3 narrowest{1, 1, 1};   // fewest cells of a rank's block a direction
-  int ghosts = 1;            // layers of the gas grid
-  int tall = -1;             // direction that is cut last among ranks
-  double fall_time = 0;      // s, a seeded particle's to the other side of the box; 0 without gravity
-  double drag_limit = 0;     // 2m/b at the heaviest drag in sight, s; 0 without coupling
+  double step = 0;              // dt_CFD at the start, s
+  double longest_step = 0;      // s
+  double shortest_step = 0;     // s
+  double substep = 0;           // dt_DEM, the longest, s; 0 without particles
+  std::vector<double> corners;  // times that gas steps end on, in order; the last is the end, s
+  double skin = 0;              // m
+  Int3 cells{};                 // of the decomposition: the gas grid's, or blocks wide enough for particles alone
+  Int3 narrowest{1, 1, 1};      // fewest cells of a rank's block a direction
+  int ghosts = 1;               // layers of the gas grid
+  int tall = -1;                // direction that is cut last among ranks
+  double fall_time = 0;         // s, a seeded particle's to the other side of the box; 0 without gravity
+  double drag_limit = 0;        // 2m/b at the heaviest drag in sight, s; 0 without coupling
 
   double cell_ratio = 0;  // Δ*; 0 unless gas and particles
   std::int64_t cell_count = 0, particle_count = 0, steps = 0;

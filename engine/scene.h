@@ -68,8 +68,10 @@ struct Scene {
   std::optional<ParticleScene> particles;
   std::optional<CouplingScene> coupling;
   double end_time = 0;                  // s
-  std::optional<double> longest_step;   // s; τ if absent
-  std::optional<double> shortest_step;  // s; longest/1000 if absent
+  std::optional<double> step;           // dt_CFD at the start, s; τ if absent
+  std::optional<double> longest_step;   // s; as step if absent
+  std::optional<double> shortest_step;  // s; step/1000 if absent
+  std::optional<double> courant;        // Σ|U|dt/h, at most
   std::vector<MonitorSetup> monitors;
   std::optional<double> plot_interval;  // s
 };

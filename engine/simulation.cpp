@@ -5,11 +5,11 @@
 #include <cstdio>
 #include <utility>
 
+#include "grid/rows.h"
+
 namespace bedflow {
 
 namespace {
-
-constexpr int steps_before_growth = 10;  // converged steps before a cut step size grows again
 
 std::string number(double value) {
   char text[32];
@@ -36,6 +36,22 @@ DemSetup dem_setup(const Plan& plan) {
       },
       particles.tangential);
   return setup;
+}
+
+// The largest Σ|u|/h of a cell, 1/s.
+double fastest_transport(const Grid& grid, const FaceField& velocity) {
+  double fastest = 0;
+  for_rows(grid, [&](auto first, int n) {
+    for (auto c = first; c < first + n; ++c) {
+      double rate = 0;
+      for (int d = 0; d < 3; ++d) {
+        const double* u = velocity[d].data();
+        rate += std::max(std::abs(u[c]), std::abs(u[c + grid.stride(d)])) / grid.spacing[d];
+      }
+      fastest = std::max(fastest, rate);
+    }
+  });
+  return fastest;
 }
 
 }  // namespace
@@ -65,7 +81,7 @@ Simulation::Simulation(const Plan& plan, const Comm& comm, PhaseTimer& timer)
     : plan_(plan),
       timer_(timer),
       decomposition_(comm, plan.cells, plan.scene.size, plan.scene.periodic, plan.tall, plan.narrowest),
-      step_size_(plan.step) {
+      controller_(plan) {
   if (plan.scene.gas) gas_ = std::make_unique<GasPart>(decomposition_, plan_, timer_);
   if (plan.scene.particles) dem_ = std::make_unique<Dem>(decomposition_, dem_setup(plan_), timer_);
   if (plan.scene.coupling) coupling_ = std::make_unique<CouplingPart>(decomposition_, plan_, *gas_, timer_);
@@ -78,15 +94,16 @@ Simulation::Simulation(const Plan& plan, const Comm& comm, PhaseTimer& timer)
 // ------------------------------------------------------------------------------------------------ one step
 
 void Simulation::step() {
-  double dt = std::min(step_size_, plan_.scene.end_time - time_);
-  if (coupling_) deposit_volume();                                            // particles -> ε, ∂ε/∂t
-  if (coupling_) find_drag();                                                 // U, ε -> b
+  if (coupling_) deposit_volume();  // particles -> ε, ∂ε/∂t
+  if (coupling_) find_drag();       // U, ε -> b
+  if (gas_) note(controller_.hold(step_limit(), time_));
+  double dt = controller_.next(time_);
   if (coupling_) deposit_drag(dt);                                            // b and bV -> faces
   if (gas_) dt = advance_gas(dt);                                             // U, p
   if (coupling_) coupling_->transfer.sample(gas_->state, dem_->particles());  // U, ∇p -> F_g
   if (audit_exchange_) audit_exchange();
   if (dem_) advance_particles(dt);  // contacts, walls, motion, in sub-steps
-  time_ += dt;
+  time_ = controller_.end(time_, dt);
   last_step_ = dt;
   ++steps_;
 }
@@ -116,31 +133,39 @@ int Simulation::substeps_in(double dt) const {
   return std::max(1, static_cast<int>(std::ceil(dt / plan_.substep - 1e-9)));
 }
 
+// Of the state that a step starts from: the Courant number; and half of 2m/b, beyond which frozen drag is unstable, where the
+// step may grow at all (the plan has seen to time.step). Collective.
+StepLimit Simulation::step_limit() const {
+  StepLimit limit;
+  const Scene& scene = plan_.scene;
+  if (scene.courant) {
+    const double rate = decomposition_.comm().max(fastest_transport(gas_->grid, gas_->state.velocity));
+    if (rate > 0) {
+      limit = {*scene.courant / rate, "the Courant number must stay below time.courant = " + number(*scene.courant)};
+    }
+  }
+  if (coupling_ && std::holds_alternative<Explicit>(scene.coupling->scheme) && plan_.longest_step > plan_.step) {
+    const double b = decomposition_.comm().max(coupling_->transfer.largest_drag()), most = scene.particles->mass / b;
+    if (b > 0 && most < limit.longest) limit = {most, "the drag of the particles allows m/b = " + number(most) + " s"};
+  }
+  return limit;
+}
+
 // Takes the longest step up to dt that converges; returns it.
 double Simulation::advance_gas(double dt) {
   const Exchange* exchange = coupling_ ? &coupling_->exchange : nullptr;
   for (;;) {
     gas_outcome_ = gas_->solver.advance(gas_->state, exchange, time_, dt);
     if (gas_outcome_.converged) break;
-    const double shorter = 0.9 * dt;
-    if (shorter < plan_.shortest_step) {
-      throw Stop(Reason::not_converged, "the gas does not converge at t = " + number(time_) + " s with dt = " + number(dt) +
-                                            " s, and 0.9 of it is below time.shortest_step = " + number(plan_.shortest_step) +
-                                            " s: " + gas_outcome_.reason);
-    }
-    notes_.push_back("step " + std::to_string(steps_ + 1) + ": dt cut from " + number(dt) + " to " + number(shorter) +
-                     " s: " + gas_outcome_.reason);
-    dt = step_size_ = shorter;
+    note(controller_.cut(dt, time_, gas_outcome_.reason));
     if (coupling_) deposit_drag(dt);  // what the gas is to lose depends on the step
-    good_steps_ = 0;
   }
-  if (step_size_ < plan_.step && ++good_steps_ >= steps_before_growth) {
-    step_size_ = std::min(plan_.step, step_size_ / 0.9);
-    good_steps_ = 0;
-    notes_.push_back("step " + std::to_string(steps_ + 1) + ": dt grows to " + number(step_size_) +
-                     " s: " + std::to_string(steps_before_growth) + " steps have converged");
-  }
+  note(controller_.converged());
   return dt;
+}
+
+void Simulation::note(const std::string& change) {
+  if (!change.empty()) notes_.push_back("step " + std::to_string(steps_ + 1) + ": " + change);
 }
 
 // What the gas lost less what the particles received, in the worst direction, over the sum of absolute values.

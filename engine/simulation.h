@@ -12,6 +12,7 @@
 #include "gas/gas_solver.h"
 #include "particles/dem.h"
 #include "plan.h"
+#include "step_controller.h"
 
 namespace bedflow {
 
@@ -36,13 +37,14 @@ class Simulation {
   std::uint64_t steps() const { return steps_; }
   double time() const { return time_; }  // s
   bool finished() const;
-  double step_size() const { return step_size_; }                  // s, the controller's
+  double step_size() const { return controller_.size(); }          // s
   double last_step() const { return last_step_; }                  // s, taken
   std::uint64_t substeps() const { return substeps_; }             // of this process
   std::int64_t particle_count() const { return particle_count_; }  // all ranks
   const GasOutcome& gas_outcome() const { return gas_outcome_; }
-  const Failure& failure() const;         // of this rank, to be voted on
-  std::vector<std::string> take_notes();  // changes of the step size, for the event log
+  GasBalance gas_balance() const { return gas_->solver.balance(); }  // of the last step; with gas only
+  const Failure& failure() const;                                    // of this rank, to be voted on
+  std::vector<std::string> take_notes();                             // changes of the step size, for the event log
 
   Observation observation();
 
@@ -76,7 +78,9 @@ class Simulation {
   void deposit_drag(double dt);
   void pull_anew();
   int substeps_in(double dt) const;
+  StepLimit step_limit() const;
   double advance_gas(double dt);
+  void note(const std::string& change);
   void advance_particles(double dt);
   void audit_exchange();
   void restore_gas(const CheckpointReader& from);
@@ -90,8 +94,8 @@ class Simulation {
   std::unique_ptr<CouplingPart> coupling_;
 
   std::uint64_t steps_ = 0, substeps_ = 0;
-  double time_ = 0, step_size_ = 0, last_step_ = 0, settled_time_ = 0;
-  int good_steps_ = 0;        // since the step size changed
+  StepController controller_;
+  double time_ = 0, last_step_ = 0, settled_time_ = 0;
   double hidden_solids_ = 0;  // m³ cut by the floor of ε in the last step
   double max_overlap_ = 0;
   bool audit_exchange_ = false;  // a monitor asks for it

@@ -10,6 +10,7 @@ namespace bedflow {
 namespace {
 
 constexpr std::array<const char*, 3> velocity_names = {"gas/velocity_x", "gas/velocity_y", "gas/velocity_z"};
+constexpr std::array<const char*, 3> fall_names = {"gas/fall_x", "gas/fall_y", "gas/fall_z"};  // GasState::fall
 
 // This rank's cells; for a face field of direction d the box's last face goes with the last block.
 GridPart part_of(const Grid& grid, int d = -1) {
@@ -69,9 +70,9 @@ CheckpointContent Simulation::checkpoint() const {
                      {"cells/x", plan_.scene.cells[0]},
                      {"cells/y", plan_.scene.cells[1]},
                      {"cells/z", plan_.scene.cells[2]},
-                     {"controller/step_size", step_size_},
+                     {"controller/step_size", controller_.size()},
                      {"controller/last_step", last_step_},
-                     {"controller/good_steps", good_steps_}};
+                     {"controller/good_steps", controller_.good_steps()}};
   if (gas_) {
     const GasState& gas = gas_->state;
     content.arrays.push_back(
@@ -81,6 +82,7 @@ CheckpointContent Simulation::checkpoint() const {
     for (int d = 0; d < 3; ++d) {
       content.arrays.push_back(grid_array(velocity_names[d], "m/s", "gas velocity at the faces of its direction", gas.velocity[d],
                                           part_of(gas_->grid, d)));
+      content.numbers[fall_names[d]] = gas.fall[d];
     }
   }
   if (dem_) {
@@ -153,9 +155,8 @@ void Simulation::restore(const CheckpointReader& from) {
   if (dem_) same("particles/diameter", "particles.diameter", plan_.scene.particles->diameter);
   steps_ = from.step();
   time_ = from.time();
-  step_size_ = std::min(plan_.step, from.number("controller/step_size"));
+  controller_.restore(from.number("controller/step_size"), static_cast<int>(from.number("controller/good_steps")));
   last_step_ = from.number("controller/last_step");
-  good_steps_ = static_cast<int>(from.number("controller/good_steps"));
   if (gas_) restore_gas(from);
   if (dem_) restore_particles(from);
 }
@@ -165,7 +166,10 @@ void Simulation::restore_gas(const CheckpointReader& from) {
   gas_->solver.prepare(gas, time_);
   read_grid(from, "gas/pressure", gas.pressure, part_of(gas_->grid));
   read_grid(from, "gas/fraction", gas.fraction, part_of(gas_->grid));
-  for (int d = 0; d < 3; ++d) read_grid(from, velocity_names[d], gas.velocity[d], part_of(gas_->grid, d));
+  for (int d = 0; d < 3; ++d) {
+    read_grid(from, velocity_names[d], gas.velocity[d], part_of(gas_->grid, d));
+    gas.fall[d] = from.number(fall_names[d]);
+  }
   gas_->halo.fill(gas.pressure);
   gas_->halo.fill(gas.fraction);
   gas_->halo.fill(gas.velocity);

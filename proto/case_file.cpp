@@ -66,6 +66,7 @@ std::vector<CaseFault> check_case(const v1::Case& value) {
   std::vector<CaseFault> faults = walk_case(value);
   check_scene(value, faults);
   check_faces(value, faults);
+  check_flow(value, faults);
   check_particles(value, faults);
   check_seeding(value, faults);
   check_monitors(value, faults);

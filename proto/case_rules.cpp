@@ -31,6 +31,10 @@ void check_time(const v1::Case& value, CaseFaults& faults) {
     faults.push_back(
         {"time.step", "is missing: without particles there is no collision time to take it from; set the gas step in s"});
   }
+  if (time.has_longest_step() && time.has_step() && time.longest_step() < time.step()) {
+    faults.push_back({"time.longest_step", "is " + number_text(time.longest_step()) + " s, shorter than time.step, " +
+                                               number_text(time.step()) + " s: make it longer"});
+  }
   if (time.has_step() && time.has_shortest_step() && time.shortest_step() > time.step()) {
     faults.push_back({"time.shortest_step", "is " + number_text(time.shortest_step()) + " s, longer than time.step, " +
                                                 number_text(time.step()) + " s: make it shorter"});

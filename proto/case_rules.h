@@ -14,6 +14,7 @@ using CaseFaults = std::vector<CaseFault>;
 
 void check_scene(const v1::Case& value, CaseFaults& faults);      // what must be there together; time; grid and kernel
 void check_faces(const v1::Case& value, CaseFaults& faults);      // periodic directions, walls, patches, balance of flows
+void check_flow(const v1::Case& value, CaseFaults& faults);       // driven directions, panels
 void check_particles(const v1::Case& value, CaseFaults& faults);  // types and sizes, contacts' reach
 void check_seeding(const v1::Case& value, CaseFaults& faults);    // where they are at time 0
 void check_monitors(const v1::Case& value, CaseFaults& faults);   // monitors and the references that belong to them
@@ -35,6 +36,9 @@ void check_extent(const v1::Case& value, const v1::Vector& low, const v1::Vector
 double largest_diameter(const v1::Particles& particles);
 double largest_diameter(const v1::ParticleType& type);
 double smallest_diameter(const v1::ParticleType& type);
+
+using Instants = google::protobuf::RepeatedPtrField<v1::Instant>;
+void check_schedule(const Instants& schedule, const std::string& path, CaseFaults& faults);  // in order
 
 using TypeShares = google::protobuf::RepeatedPtrField<v1::TypeShare>;
 const v1::ParticleType* type_named(const v1::Particles& particles, const std::string& name);  // null: there is none

@@ -34,6 +34,28 @@ void check_patches(const v1::Case& value, const v1::Face& face, const std::strin
       if (along != axis) check_extent(value, patch.low(), patch.high(), along, item_path(path + ".inflow.patches", i), faults);
     }
   }
+  const v1::Box& rectangle = face.mass_inflow().rectangle();
+  if (!rectangle.has_low() || !rectangle.has_high()) return;
+  for (std::size_t along = 0; along < 3; ++along) {
+    if (along != axis) check_extent(value, rectangle.low(), rectangle.high(), along, path + ".mass_inflow.rectangle", faults);
+  }
+}
+
+// Of Inflow or Patch: a ramp or a schedule.
+template <typename Jet>
+void check_course(const Jet& jet, const std::string& path, CaseFaults& faults) {
+  check_schedule(jet.schedule(), path, faults);
+  if (jet.has_ramp() && jet.schedule_size() > 0) {
+    faults.push_back({path + ".ramp", "is set, and so is schedule: remove one of the two"});
+  }
+}
+
+void check_courses(const v1::Face& face, const std::string& path, CaseFaults& faults) {
+  check_course(face.inflow(), path + ".inflow", faults);
+  for (int i = 0; i < face.inflow().patches_size(); ++i) {
+    check_course(face.inflow().patches(i), item_path(path + ".inflow.patches", i), faults);
+  }
+  check_schedule(face.mass_inflow().schedule(), path + ".mass_inflow", faults);
 }
 
 double widest(const v1::Particles& particles, const TypeShares& types) {
@@ -112,8 +134,10 @@ void check_faces(const v1::Case& value, CaseFaults& faults) {
     }
     check_wall(face, path, axis, faults);
     check_patches(value, face, path, axis, faults);
+    check_courses(face, path, faults);
     check_particles_at(value, face, path, axis, faults);
     if (face.has_inflow() && lets_gas_in(face.inflow())) inflow = path + ".inflow";
+    if (face.mass_inflow().mass_flow() > 0) inflow = path + ".mass_inflow";
     has_outflow = has_outflow || face.has_outflow();
   });
   if (value.has_gas() && !inflow.empty() && !has_outflow) {

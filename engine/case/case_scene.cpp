@@ -17,24 +17,45 @@ Vec3 vec(const v1::Vector& v) {
 
 // ---- gas
 
-Inflow::Jet jet(double velocity, bool has_ramp, const v1::Ramp& ramp) {
-  return has_ramp ? Inflow::Jet{velocity, ramp.from(), ramp.duration()} : Inflow::Jet{velocity, velocity, 0};
+Schedule schedule(const google::protobuf::RepeatedPtrField<v1::Instant>& from) {
+  Schedule result;
+  for (const v1::Instant& instant : from) result.instants.push_back({instant.time(), instant.share()});
+  return result;
 }
 
-Boundary boundary(const v1::Face& face) {
+// Of v1::Inflow or v1::Patch.
+template <class From>
+Inflow::Jet jet(const From& from) {
+  if (from.has_ramp()) return {from.velocity(), from.ramp().from(), from.ramp().duration()};
+  return {from.velocity(), from.velocity(), 0, schedule(from.schedule())};
+}
+
+MassInflow mass_inflow(const v1::MassInflow& from, double density, const v1::Lengths& size, int axis) {
+  const Vec3 edges{size.x(), size.y(), size.z()};
+  const bool part = from.has_rectangle();
+  const Vec3 low = part ? vec(from.rectangle().low()) : Vec3{}, high = part ? vec(from.rectangle().high()) : edges;
+  const int one = (axis + 1) % 3, other = (axis + 2) % 3;
+  const double area = (high[one] - low[one]) * (high[other] - low[other]);
+  const Schedule course = schedule(from.schedule());
+  return part ? MassInflow(from.mass_flow(), density, area, course, low, high)
+              : MassInflow(from.mass_flow(), density, area, course);
+}
+
+Boundary boundary(const v1::Face& face, const v1::Case& scene, int axis) {
   switch (face.condition_case()) {
     case v1::Face::kFreeSlipWall:
       return FreeSlip{};
     case v1::Face::kOutflow:
       return Outflow{face.outflow().pressure()};
     case v1::Face::kInflow: {
-      const v1::Inflow& from = face.inflow();
-      Inflow inflow{jet(from.velocity(), from.has_ramp(), from.ramp()), {}};
-      for (const v1::Patch& patch : from.patches()) {
-        inflow.patches.push_back({vec(patch.low()), vec(patch.high()), jet(patch.velocity(), patch.has_ramp(), patch.ramp())});
+      Inflow inflow{jet(face.inflow()), {}};
+      for (const v1::Patch& patch : face.inflow().patches()) {
+        inflow.patches.push_back({vec(patch.low()), vec(patch.high()), jet(patch)});
       }
       return inflow;
     }
+    case v1::Face::kMassInflow:
+      return mass_inflow(face.mass_inflow(), scene.gas().density(), scene.domain().size(), axis);
     default:
       return NoSlip{vec(face.no_slip_wall().velocity())};
   }
@@ -56,6 +77,19 @@ Convection convection(const v1::Gas& from) {
   }
 }
 
+Drive drive(const v1::Drive& from) {
+  Drive result{.pressure_drop = {}, .mass_flux = {}, .schedule = schedule(from.schedule())};
+  if (from.has_pressure_drop()) result.pressure_drop = from.pressure_drop();
+  if (from.has_mass_flux()) result.mass_flux = from.mass_flux();
+  return result;
+}
+
+Panel panel_of(const v1::Panel& from) {
+  Panel panel{vec(from.low()), vec(from.high()), Baffle{}};
+  if (from.has_plate()) panel.kind = Plate{from.plate().linear(), from.plate().quadratic()};
+  return panel;
+}
+
 GasScene gas_scene(const v1::Case& from) {
   const v1::Gas& gas = from.gas();
   const v1::Simple& simple = gas.simple();
@@ -74,7 +108,9 @@ GasScene gas_scene(const v1::Case& from) {
                  .pressure_tolerance = simple.pressure_tolerance()};
   const SixFaces faces = six_faces(from.domain().faces());
   for (int d = 0; d < 3; ++d)
-    for (int side = 0; side < 2; ++side) scene.setup.faces[d][side] = boundary(*faces[d][side]);
+    for (int side = 0; side < 2; ++side) scene.setup.faces[d][side] = boundary(*faces[d][side], from, d);
+  scene.setup.drive = {drive(gas.driving().x()), drive(gas.driving().y()), drive(gas.driving().z())};
+  for (const v1::Panel& panel : from.domain().panels()) scene.setup.panels.push_back(panel_of(panel));
   return scene;
 }
 
@@ -246,7 +282,9 @@ Scene make_scene(const v1::Case& from) {
   if (from.has_particles()) scene.particles = particle_scene(from);
   if (from.has_coupling()) scene.coupling = coupling_scene(from.coupling());
   scene.end_time = from.time().end();
-  if (from.time().has_step()) scene.longest_step = from.time().step();
+  if (from.time().has_step()) scene.step = from.time().step();
+  if (from.time().has_longest_step()) scene.longest_step = from.time().longest_step();
+  if (from.time().has_courant()) scene.courant = from.time().courant();
   if (from.time().has_shortest_step()) scene.shortest_step = from.time().shortest_step();
   for (const v1::Monitor& monitor : from.monitors()) {
     MonitorSetup setup{monitor.name(), statistic(monitor, from.particles()), monitor.interval()};

@@ -264,13 +264,12 @@ void Transfer::deposit_drag(const ParticleStore& particles, const Interval& step
 
 void Transfer::sample(const GasState& gas, ParticleStore& particles) {
   const PhaseTimer::Scope scope(timer_, Phase::sample, particles.owned);
-  const double* pressure = gas.pressure.data();
   for (int d = 0; d < 3; ++d)
     lattices_.each_owned_row(d, [&](Int3 first, int n) {
       const std::ptrdiff_t c = grid_.index(first[0], first[1], first[2]);
       double* gradient = gradient_[d].data();
       const double* share = buoyancy_share_[d].data();
-      for (auto at = c; at < c + n; ++at) gradient[at] = share[at] * gradient_at(pressure, d, at);
+      for (auto at = c; at < c + n; ++at) gradient[at] = share[at] * gradient_at(gas, d, at);
     });
   if (smoothing_) {
     smoothing_->apply(gradient_);
@@ -334,7 +333,7 @@ ExchangeBalance Transfer::balance(const GasState& gas, const Exchange& exchange,
       for (int i = 0; i < n; ++i) {
         const std::ptrdiff_t at = c + i;
         const double drag = exchange.drag[d].data()[at] * gas.velocity[d].data()[at] - exchange.drag_momentum[d].data()[at];
-        const double buoyancy = -grid_.cell_volume() * exchange.buoyancy[d].data()[at] * gradient_at(gas.pressure.data(), d, at);
+        const double buoyancy = -grid_.cell_volume() * exchange.buoyancy[d].data()[at] * gradient_at(gas, d, at);
         sums[d] += node[i] * (drag + buoyancy);
         sums[6 + d] += node[i] * (std::abs(drag) + std::abs(buoyancy));
       }

@@ -3,6 +3,7 @@
 // Volume and ε go to the cell centres; b, bV, buoyancy, U, ∇p to the faces of each velocity component (lattices.h).
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <optional>
 #include <variant>
@@ -70,6 +71,9 @@ class Transfer {
   // b, bV and buoyancy to the faces, as the gas is to lose them in the step, with what it still owes (models/exchange.h).
   void deposit_drag(const ParticleStore& particles, const Interval& step, Exchange& exchange);
 
+  // b of the last find_drag, this rank, kg/s.
+  double largest_drag() const { return drag_.empty() ? 0 : *std::max_element(drag_.begin(), drag_.end()); }
+
   // From the gas at the end of the step: F_g = −𝒱∇p + b (U − V) of every particle into gas_force, and for schemes that relax how
   // it follows V into gas_response.
   void sample(const GasState& gas, ParticleStore& particles);
@@ -89,8 +93,10 @@ class Transfer {
   void respond(const Scheme& scheme, ParticleStore& particles);
   void spread(const ParticleStore& particles, Exchange& exchange);
   void per_node_volume(Exchange& exchange);
-  double gradient_at(const double* pressure, int d, std::ptrdiff_t at) const {
-    return (pressure[at] - pressure[at - grid_.stride(d)]) / grid_.spacing[d];
+  // ∇p that gas and particles share: without what plates take.
+  double gradient_at(const GasState& gas, int d, std::ptrdiff_t at) const {
+    const double *p = gas.pressure.data(), taken = gas.jump ? (*gas.jump)[d].data()[at] : 0;
+    return (p[at] - p[at - grid_.stride(d)] + taken) / grid_.spacing[d] - gas.fall[d];
   }
 
   const Decomposition& decomposition_;

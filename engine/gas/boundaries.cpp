@@ -28,8 +28,8 @@ void Boundaries::for_layer(int d, int side, bool wide, Act act) const {
 // The product over both tangential directions of the overlap of cell and rectangle, over the cell's edge.
 void Boundaries::cover_patches(int d, int side) {
   const Boundary* boundary = at(d, side);
-  if (!boundary || !std::holds_alternative<Inflow>(*boundary)) return;
-  for (const Inflow::Patch& patch : std::get<Inflow>(*boundary).patches) {
+  if (!boundary || !inflow_of(*boundary)) return;
+  for (const Inflow::Patch& patch : inflow_of(*boundary)->patches) {
     std::vector<double> share;
     Int3 cell{};
     const auto overlap = [&](int t) {
@@ -66,7 +66,7 @@ void Boundaries::set_normal_velocity(FaceField& velocity, const Field& fraction,
       const Boundary* boundary = at(d, side);
       if (!boundary || outflow(d, side)) continue;
       double* u = velocity[d].data();
-      if (const Inflow* inflow = std::get_if<Inflow>(boundary)) {
+      if (const Inflow* inflow = inflow_of(*boundary)) {
         const double background = inflow->jet.at(time), inward = side == 0 ? 1 : -1;
         std::size_t cell = 0;
         for_layer(d, side, false, [&](auto in, auto beyond) {
@@ -94,7 +94,7 @@ void Boundaries::set_velocity_beyond(FaceField& velocity) const {
           continue;
         }
         // Mean over the face: the wall's velocity, or 0 on inflows; no gradient otherwise.
-        const bool fixed = std::holds_alternative<NoSlip>(*boundary) || std::holds_alternative<Inflow>(*boundary);
+        const bool fixed = std::holds_alternative<NoSlip>(*boundary) || inflow_of(*boundary);
         const double on_face = fixed && std::holds_alternative<NoSlip>(*boundary) ? std::get<NoSlip>(*boundary).velocity[c] : 0;
         for_layer(d, side, true, [=](auto in, auto beyond) { u[beyond] = fixed ? 2 * on_face - u[in] : u[in]; });
       }

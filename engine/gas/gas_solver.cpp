@@ -26,7 +26,9 @@ GasStep::GasStep(const Decomposition& given_decomposition, const Grid& given_gri
       setup(given_setup.method == GasMethod::simple ? given_setup : unrelaxed(given_setup)),
       timer(given_timer),
       boundaries(decomposition, grid, setup.faces),
-      momentum(decomposition, grid, halo, setup, boundaries),
+      panels(grid, decomposition, boundaries, setup.panels),
+      momentum(decomposition, grid, halo, setup, boundaries, panels),
+      driven(decomposition, grid, setup),
       pressure(decomposition, grid, halo, boundaries, setup.preconditioner),
       old_velocity(grid),
       old_pressure(grid) {}
@@ -35,6 +37,8 @@ void GasStep::set_boundaries(GasState& state, double time, bool pressure_on_face
   boundaries.continue_field(state.fraction);
   halo.fill(state.fraction);
   boundaries.set_normal_velocity(state.velocity, state.fraction, time);
+  panels.close(state.velocity);
+  driven.set_time(state, time);
   boundaries.set_velocity_beyond(state.velocity);
   halo.fill(state.velocity);
   boundaries.set_pressure(state.pressure, pressure_on_face);
@@ -116,6 +120,7 @@ PressureCorrection::Result GasStep::correct(GasState& state, double enough, doub
   const double cells = static_cast<double>(grid.global[0]) * grid.global[1] * grid.global[2];
   const auto result = pressure.solve(setup.pressure_tolerance, enough / cells);
   pressure.correct(state.velocity, state.pressure, momentum.mobility(), share);
+  driven.steer(state, momentum.fraction(), momentum.mobility());
   boundaries.set_velocity_beyond(state.velocity);
   halo.fill(state.velocity);
   halo.fill(state.pressure);
@@ -138,6 +143,7 @@ GasOutcome GasSolver::advance(GasState& state, const Exchange* exchange, double 
   GasStep& w = *step_;
   w.old_velocity = state.velocity;
   w.old_pressure = state.pressure;
+  w.old_fall = state.fall;
   const GasBalance old_balance = w.balance;
   GasOutcome outcome;
   w.set_boundaries(state, time + dt, true);
@@ -150,9 +156,11 @@ GasOutcome GasSolver::advance(GasState& state, const Exchange* exchange, double 
   if (!outcome.converged) {
     state.velocity = w.old_velocity;
     state.pressure = w.old_pressure;
+    state.fall = w.old_fall;
     w.balance = old_balance;
     return outcome;
   }
+  w.panels.set_jumps(state, w.grid, w.momentum.fraction(), w.setup.density);
   w.boundaries.set_pressure(state.pressure, false);
   w.halo.fill(state.pressure);
   w.measure(state);

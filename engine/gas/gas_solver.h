@@ -3,12 +3,14 @@
 //   ∂ε/∂t + ∇·(ε U) = 0
 //   ρg ε DU/Dt = −ε_b ∇p + ∇·σ + Σ b (V − U)/cell + ρg ε_b g,     σ = μ(∇U + ∇Uᵀ) − (2/3) μ (∇·U) I
 //
-// backward Euler. ε_b is the gas share of a face's cell as the particles' buoyancy leaves it (Exchange).
+// backward Euler. Along driven periodic directions ∇p is that of p less a constant fall. ε_b is the gas share of a face's cell as the particles' buoyancy leaves it (Exchange).
 #pragma once
 
 #include <array>
 #include <memory>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "base/phase_timer.h"
 #include "gas/conjugate_gradients.h"
@@ -27,6 +29,8 @@ struct GasSetup {
   double viscosity = 0;                            // μ, Pa·s
   Vec3 gravity;                                    // m/s²
   std::array<std::array<Boundary, 2>, 3> faces{};  // [direction][low, high]; ignored where periodic
+  std::array<Drive, 3> drive{};                    // along periodic directions
+  std::vector<Panel> panels{};
   Convection convection{};                         // the grid needs ghosts_of(convection) layers
   double pressure_relaxation = 0.8;                // of SIMPLE, like the next three
   double velocity_relaxation = 0.5;
@@ -42,6 +46,9 @@ struct GasState {
   Field pressure;       // p, Pa, at centres
   Field fraction;       // ε, at centres, ghosts filled; 1 without particles
   Field fraction_rate;  // ∂ε/∂t, 1/s, at centres; 0 without particles or with the displacement switched off
+
+  std::optional<FaceField> jump;  // with plates in the scene: pressure that they take, Pa; no particle feels it as ∇p
+  Vec3 fall;                      // of pressure per length along periodic directions, beside that of p, Pa/m
 
   explicit GasState(const Grid& grid) : velocity(grid), pressure(grid), fraction(grid, 1), fraction_rate(grid) {}
 };

@@ -3,8 +3,10 @@
 
 #include <sstream>
 
+#include "gas/drive.h"
 #include "gas/gas_solver.h"
 #include "gas/momentum.h"
+#include "gas/panels.h"
 #include "gas/pressure.h"
 
 namespace bedflow {
@@ -31,7 +33,7 @@ struct GasStep {
   // Sweeps of the momentum equations until they leave this share of the error; returns what they do leave.
   double solve_momentum(GasState& state, double coupling, double leave);
   // The pressure correction, solved to setup.pressure_tolerance or Σ|imbalance| ≤ enough (m³/s), added in full to the velocity
-  // and by `share` to the pressure; ghosts right.
+  // and by `share` to the pressure; wanted fluxes met; ghosts right.
   PressureCorrection::Result correct(GasState& state, double enough, double share);
 
   const Decomposition& decomposition;
@@ -40,10 +42,13 @@ struct GasStep {
   const GasSetup setup;
   PhaseTimer& timer;
   Boundaries boundaries;
+  Panels panels;
   Momentum momentum;
+  DrivenFlow driven;
   PressureCorrection pressure;
   FaceField old_velocity;
   Field old_pressure;
+  Vec3 old_fall;
   GasBalance balance;
   double displacement = 0;  // Σ|∂ε/∂t| V, m³/s
 };

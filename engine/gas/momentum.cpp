@@ -12,12 +12,13 @@ constexpr int most_sweeps = 200;
 }  // namespace
 
 Momentum::Momentum(const Decomposition& decomposition, const Grid& grid, Halo& halo, const GasSetup& setup,
-                   const Boundaries& boundaries)
+                   const Boundaries& boundaries, const Panels& panels)
     : decomposition_(decomposition),
       grid_(grid),
       halo_(halo),
       setup_(setup),
       boundaries_(boundaries),
+      panels_(panels),
       old_fraction_(grid, 1),
       fraction_(grid, 1),
       local_(grid),
@@ -68,6 +69,7 @@ bool Momentum::begin(const GasState& state, const FaceField& old_velocity, const
       for (auto i = c; i < c + n; ++i) least = std::min({least, b[i], local[i]});
     });
   }
+  begin_panels();
   halo_.fill(fraction_);
   return least > 0;
 }
@@ -142,21 +144,22 @@ Momentum::Sums Momentum::assemble(const GasState& state) {
   const double* p = state.pressure.data();
   Sums sums;
   for (int d = 0; d < 3; ++d) {
-    assemble_inside(d, p);
+    assemble_inside(d, p, state.fall[d] * grid_.spacing[d]);
     for (int side = 0; side < 2; ++side)
       if (boundaries_.outflow(d, side)) assemble_outflow(d, side, p);
     for (int t = 0; t < 3; ++t)
       for (int side = 0; side < 2; ++side)
         if (t != d && boundaries_.at(t, side)) apply_boundary(d, t, side);
     correct_convection(d, state.velocity[d].data());
+    apply_panels(d, state.velocity[d].data());
     relax(d, state.velocity[d].data(), sums);
   }
   sums.coupling = *std::max_element(coupling_.begin(), coupling_.end());
   return sums;
 }
 
-// Faces with a whole control volume, as if there were no boundaries beside them.
-void Momentum::assemble_inside(int d, const double* p) {
+// Faces with a whole control volume, as if there were no boundaries beside them. fall: of pressure from cell to cell, beside p's.
+void Momentum::assemble_inside(int d, const double* p, double fall) {
   const int t1 = (d + 1) % 3, t2 = (d + 2) % 3;
   const std::ptrdiff_t s = grid_.stride(d), s1 = grid_.stride(t1), s2 = grid_.stride(t2);
   const double mu = setup_.viscosity, volume = grid_.cell_volume();
@@ -181,7 +184,7 @@ void Momentum::assemble_inside(int d, const double* p) {
       low2[c] = across2 + std::max(0.5 * (f2[c - s] + f2[c]), 0.0);
       high2[c] = across2 + std::max(-0.5 * (f2[c - s + s2] + f2[c + s2]), 0.0);
       diagonal[c] = local[c];
-      source[c] = constant[c] + push[c] * (p[c - s] - p[c]) + dilatation * (divergence[c] - divergence[c - s]);
+      source[c] = constant[c] + push[c] * (p[c - s] - p[c] + fall) + dilatation * (divergence[c] - divergence[c - s]);
     }
   });
 }

@@ -17,6 +17,7 @@
 
 #include "gas/boundaries.h"
 #include "gas/gas_solver.h"
+#include "gas/panels.h"
 #include "grid/halo.h"
 #include "grid/rows.h"
 
@@ -24,7 +25,8 @@ namespace bedflow {
 
 class Momentum {
  public:
-  Momentum(const Decomposition& decomposition, const Grid& grid, Halo& halo, const GasSetup& setup, const Boundaries& boundaries);
+  Momentum(const Decomposition& decomposition, const Grid& grid, Halo& halo, const GasSetup& setup, const Boundaries& boundaries,
+           const Panels& panels);
 
   // What stays the same over the outer iterations of a step of dt (s). old_velocity: at the step's start. The state's ε has its
   // ghosts. False: on this rank ε° or ε_b is not positive somewhere.
@@ -59,9 +61,11 @@ class Momentum {
 
   void begin_component(int d, const GasState& state, const Field& old_velocity, const Exchange* exchange, double dt);
   void set_fluxes(const FaceField& velocity);
-  void assemble_inside(int d, const double* p);
+  void assemble_inside(int d, const double* p, double fall);
   void assemble_outflow(int d, int side, const double* p);
   void apply_boundary(int d, int t, int side);
+  void begin_panels();
+  void apply_panels(int d, const double* u);
   void correct_convection(int d, const double* u);
   template <class Scheme>
   void correct_along(const Scheme& scheme, int d, int t, const double* u);
@@ -76,6 +80,7 @@ class Momentum {
   Halo& halo_;
   const GasSetup& setup_;
   const Boundaries& boundaries_;
+  const Panels& panels_;
 
   Field old_fraction_;                 // ε°
   FaceField fraction_;                 // ε

@@ -41,7 +41,7 @@ void Momentum::assemble_outflow(int d, int side, const double* p) {
 // have their own velocity; none to a free-slip wall or an outflow. What enters through an outflow brings none.
 void Momentum::apply_boundary(int d, int t, int side) {
   const Boundary& boundary = *boundaries_.at(t, side);
-  const bool fixed = std::holds_alternative<NoSlip>(boundary) || std::holds_alternative<Inflow>(boundary);
+  const bool fixed = std::holds_alternative<NoSlip>(boundary) || inflow_of(boundary);
   const double velocity = std::holds_alternative<NoSlip>(boundary) ? std::get<NoSlip>(boundary).velocity[d] : 0;
   const double diffusion = setup_.viscosity * grid_.cell_volume() / (grid_.spacing[t] * grid_.spacing[t]);
   Equations& e = equations_[d];

@@ -59,6 +59,7 @@ void Momentum::correct_along(const Scheme& scheme, int d, int t, const double* u
   }
   sides(from, to, 0.5, 0.5);
 
+  for (const std::ptrdiff_t side : panels_.beside[d][t]) correction[side] = 0;
   for_rows(grid_, low, high, [=](auto start, int n) {
 #pragma GCC ivdep
     for (auto c = start; c < start + n; ++c) source[c] += correction[c] - correction[c + s];

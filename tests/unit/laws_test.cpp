@@ -39,6 +39,7 @@ TEST(Laws, OfTheSchemaAreThoseOfTheCode) {
   EXPECT_EQ(arms(v1::Particles::descriptor(), "contact"), NamesOf<ContactLaw>::get());
   EXPECT_EQ(arms(v1::Particles::descriptor(), "tangential"), NamesOf<TangentialLaw>::get());
   EXPECT_EQ(arms(v1::Gas::descriptor(), "convection"), NamesOf<Convection>::get());
+  EXPECT_EQ(arms(v1::Panel::descriptor(), "kind"), NamesOf<decltype(Panel::kind)>::get());
   EXPECT_EQ(arms(v1::Face::descriptor(), "condition"), NamesOf<Boundary>::get());
   EXPECT_EQ(arms(v1::Monitor::descriptor(), "quantity"), NamesOf<Statistic>::get());
   EXPECT_EQ(arms(v1::ParticleType::descriptor(), "sizes"), NamesOf<SizeLaw>::get());

@@ -70,6 +70,7 @@ void expect_same_on_all_ranks(Scene scene) {
     ASSERT_NEAR(part.state.pressure(i, j, k), whole.state.pressure(i + first[0], j + first[1], k + first[2]),
                 agreement * highest);
   });
+  for (int d = 0; d < 3; ++d) EXPECT_NEAR(part.state.fall[d], whole.state.fall[d], agreement * norm(whole.state.fall));
   EXPECT_NEAR(part.solver.balance().in, whole.solver.balance().in, agreement * (1e-6 + whole.solver.balance().in));
 }
 
@@ -93,6 +94,25 @@ TEST(GasRanks, PeriodicBoxIsTheSameOnAnyNumber) {
   scene.setup.gravity = {1, -9.81, 2};
   for (const Convection& scheme : {Convection(Upwind{}), Convection(Smart{}), Convection(Superbee{})}) {
     scene.setup.convection = scheme;
+    expect_same_on_all_ranks(scene);
+  }
+}
+
+// Rectangles that lie across the blocks of every rank, in a box that is driven both ways.
+TEST(GasRanks, PanelsAndDrivenFlowAreTheSameOnAnyNumber) {
+  for (int normal = 0; normal < 3; ++normal) {
+    Scene scene{{8, 8, 8}, {0.04, 0.04, 0.04}, {true, true, true}, still_air()};
+    const auto rectangle = [&](double at, double from, double to) {
+      Vec3 low{from, from, from}, high{to, to, to};
+      low[normal] = high[normal] = at;
+      return std::pair{low, high};
+    };
+    const auto [low, high] = rectangle(0.02, 0.005, 0.03);
+    const auto [plate_low, plate_high] = rectangle(0.015, 0.01, 0.04);
+    scene.setup.panels = {{low, high, Baffle{}}, {plate_low, plate_high, Plate{20, 2}}};
+    scene.setup.drive[(normal + 1) % 3].mass_flux = 0.5;
+    scene.setup.drive[normal].pressure_drop = 3;
+    scene.setup.convection = Smart{};
     expect_same_on_all_ranks(scene);
   }
 }
