@@ -237,6 +237,19 @@ TEST(Manufactured, FractionThatVariesInTimeKeepsTheOrder) {
   }
 }
 
+// A projection's steps of half a cell's passage, from the exact fields to where they have settled.
+TEST(Manufactured, ProjectionHasTheSameOrders) {
+  for (const Convection& scheme : {Convection(Upwind{}), Convection(Smart{})}) {
+    Problem p = problem(eddy_in_a_bed, false, scheme);
+    p.setup.method = GasMethod::projection;
+    p.setup.tolerance = 1e-4;
+    p.setup.pressure_tolerance = 1e-6;
+    expect_order(scheme, unsteady(p, 20, 40, 1), unsteady(p, 40, 80, 1));
+    p.exact = eddy_in_a_breathing_bed;
+    expect_order(scheme, unsteady(p, 16, 10, 0.3), unsteady(p, 32, 40, 0.3));
+  }
+}
+
 // It steepens every extremum over a few cells, and reaches its order where these are a small part: twice the grid of SMART.
 TEST(Manufactured, SuperbeeReachesOrderTwoOnFineGrids) {
   const Problem p = problem(eddy_in_a_bed, false, Superbee{});
