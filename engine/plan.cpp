@@ -29,13 +29,6 @@ std::string number(double value) {
   return text;
 }
 
-bool has_rotation(const TangentialLaw& law) {
-  return !std::holds_alternative<PairAndWall<Frictionless>>(law);
-}
-bool has_history(const TangentialLaw& law) {
-  return std::holds_alternative<PairAndWall<TangentialSpring>>(law);
-}
-
 // The largest superficial velocity that any inflow of the scene reaches, m/s.
 double fastest_inflow(const GasScene& gas) {
   double fastest = 0;
@@ -52,10 +45,10 @@ double fastest_inflow(const GasScene& gas) {
 // inflow through it.
 double drag_limit(const Scene& scene) {
   const double fraction = scene.coupling->fraction_floor;
-  const DragScene drag{scene.gas->setup.density, scene.gas->setup.viscosity, scene.particles->diameter};
+  const DragScene drag{scene.gas->setup.density, scene.gas->setup.viscosity, scene.particles->diameter()};
   const double slip = fastest_inflow(*scene.gas) / fraction;
   const double b = std::visit([&](const auto& law) { return law(drag, slip, fraction); }, scene.coupling->drag);
-  return b > 0 ? 2 * scene.particles->mass / b : 0;
+  return b > 0 ? 2 * scene.particles->mass() / b : 0;
 }
 
 void plan_time(Plan& plan) {
@@ -122,15 +115,15 @@ void plan_space(Plan& plan) {
   plan.cells = scene.cells;
   if (scene.gas) plan.ghosts = ghosts_of(scene.gas->setup.convection);
   if (scene.particles) {
-    plan.skin = scene.particles->skin > 0 ? scene.particles->skin : 0.2 * scene.particles->diameter;
+    plan.skin = scene.particles->skin > 0 ? scene.particles->skin : 0.2 * scene.particles->diameter();
     if (scene.coupling) {
       const Vec3 spacing{scene.size.x / scene.cells[0], scene.size.y / scene.cells[1], scene.size.z / scene.cells[2]};
       plan.ghosts =
-          std::max(plan.ghosts, kernel_ghosts(scene.coupling->kernel, scene.particles->diameter, spacing, plan.skin, shared));
+          std::max(plan.ghosts, kernel_ghosts(scene.coupling->kernel, scene.particles->diameter(), spacing, plan.skin, shared));
     }
-    const double reach = scene.particles->diameter + plan.skin;
+    const double reach = scene.particles->diameter() + plan.skin;
     for (int d = 0; d < 3; ++d) {
-      if (!scene.gas) plan.cells[d] = std::max(1, static_cast<int>(scene.size[d] / (2 * scene.particles->diameter)));
+      if (!scene.gas) plan.cells[d] = std::max(1, static_cast<int>(scene.size[d] / (2 * scene.particles->diameter())));
       const double cell = scene.size[d] / plan.cells[d];
       if (plan.ranks > 1) plan.narrowest[d] = std::max(plan.ghosts, static_cast<int>(std::ceil(reach / cell)));
       if (scene.periodic[d] && scene.size[d] < 2 * reach) {
@@ -152,8 +145,8 @@ void plan_space(Plan& plan) {
 
 void plan_cost(Plan& plan) {
   const Scene& scene = plan.scene;
-  const bool history = scene.particles && has_history(scene.particles->tangential);
-  const bool rotation = scene.particles && has_rotation(scene.particles->tangential);
+  const bool history = scene.particles && scene.particles->laws.history();
+  const bool rotation = scene.particles && scene.particles->laws.rotation();
   const auto cells = static_cast<double>(plan.cell_count), particles = static_cast<double>(plan.particle_count);
   // Fields of gas, exchange and pressure solver; arrays and pair list of the particles (about 8 pairs within reach of each).
   const double field = cells > 0 ? cells * sizeof(double) : 0;
@@ -206,10 +199,10 @@ void plan_parts(Plan& plan) {
             (second ? ": two layers of ghosts" : ": first order"));
   }
   add("particles and contacts", scene.particles.has_value(),
-      scene.particles ? std::to_string(plan.particle_count) + " of d = " + number(scene.particles->diameter) + " m"
+      scene.particles ? std::to_string(plan.particle_count) + " of d = " + number(scene.particles->diameter()) + " m"
                       : "the case has no particles");
   if (scene.particles) {
-    const bool rotation = has_rotation(scene.particles->tangential), history = has_history(scene.particles->tangential);
+    const bool rotation = scene.particles->laws.rotation(), history = scene.particles->laws.history();
     add("rotation", rotation, rotation ? "the tangential law turns the particles" : "without friction nothing turns them");
     add("contact history", history, history ? "the tangential spring remembers" : "the tangential law has no memory");
     add("radius per particle", false, "all have one size");
@@ -251,7 +244,7 @@ void check_coupling(Plan& plan) {
   const Scene& scene = plan.scene;
   if (!scene.coupling) return;
   plan.cell_ratio =
-      std::cbrt(scene.size.x * scene.size.y * scene.size.z / static_cast<double>(plan.cell_count)) / scene.particles->diameter;
+      std::cbrt(scene.size.x * scene.size.y * scene.size.z / static_cast<double>(plan.cell_count)) / scene.particles->diameter();
   plan.drag_limit = drag_limit(scene);
   const auto [name, limited] =
       std::visit([&](const auto& scheme) { return std::pair(std::string(scheme.name), scheme.limited(plan.step, plan.substep)); },

@@ -21,7 +21,7 @@ void write_plot_files(const Comm& comm, const std::filesystem::path& folder, con
         {"id", "", std::vector<std::int64_t>(store.id.begin(), store.id.begin() + static_cast<std::ptrdiff_t>(n))},
         {"velocity", "m/s", store.velocities()},
         {"speed", "m/s", std::move(speed)},
-        {"diameter", "m", std::vector<double>(n, 2 * dem->setup().radius)}};
+        {"diameter", "m", std::vector<double>(n, 2 * dem->setup().types.front().radius)}};
     if (dem->setup().rotation) arrays.push_back({"spin", "rad/s", store.spins()});
     write_particle_plot(comm, folder, simulation.steps(), simulation.time(), store.positions(), arrays);
   }

@@ -9,11 +9,9 @@
 #include <vector>
 
 #include "gas/gas_solver.h"
-#include "models/contact.h"
 #include "models/drag.h"
 #include "models/exchange.h"
 #include "models/kernel.h"
-#include "models/tangential.h"
 #include "particles/dem.h"
 #include "particles/seeding.h"
 #include "statistics/monitors.h"
@@ -29,24 +27,22 @@ struct GasScene {
 struct Settling {
   double duration = 0;       // s, at most
   double rest_velocity = 0;  // m/s, root mean square
-  PairAndWall<LinearSpringDashpot> contact;
+  ContactLaw contact;
 };
-
-using ContactLaw = std::variant<PairAndWall<LinearSpringDashpot>>;
-using TangentialLaw = std::variant<PairAndWall<Frictionless>, PairAndWall<Coulomb>, PairAndWall<TangentialSpring>>;
 
 struct ParticleScene {
   std::vector<SeedKind> kinds;      // types, one at least
+  std::vector<ParticleType> types;  // the same, as contacts see them
   std::vector<SeedRegion> regions;  // where they are at time 0
   std::optional<Settling> settling;
-  double diameter = 0;             // m
-  double density = 0;              // kg/m³
-  double mass = 0;                 // kg
   double collision_time = 0;       // τ, s: the smallest over pairs and walls
   double steps_per_collision = 0;  // dt_DEM = τ/steps
   double skin = 0;                 // m; 0: chosen by the plan
-  ContactLaw contact;
-  TangentialLaw tangential;
+  ContactLaws laws;
+  bool verlet = false;  // velocity Verlet, else symplectic Euler
+
+  double diameter() const { return 2 * types.front().radius; }
+  double mass() const { return types.front().mass(); }
 };
 
 struct CouplingScene {

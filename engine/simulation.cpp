@@ -20,21 +20,15 @@ std::string number(double value) {
 DemSetup dem_setup(const Plan& plan) {
   const ParticleScene& particles = *plan.scene.particles;
   DemSetup setup;
-  setup.radius = particles.diameter / 2;
-  setup.mass = particles.mass;
+  setup.types = particles.types;
   setup.gravity = plan.scene.gravity;
   setup.skin = plan.skin;
+  setup.verlet = particles.verlet;
   setup.sides = plan.scene.sides;
   if (plan.scene.coupling) {
     setup.gas = std::visit([](const auto& scheme) { return scheme.relaxes ? GasForce::relaxed : GasForce::frozen; },
                            plan.scene.coupling->scheme);
   }
-  std::visit(
-      [&]<class Law>(const PairAndWall<Law>&) {
-        setup.rotation = Law::rotation;
-        setup.history = Law::history;
-      },
-      particles.tangential);
   return setup;
 }
 
@@ -68,9 +62,9 @@ Simulation::CouplingPart::CouplingPart(const Decomposition& decomposition, const
     : exchange(gas.grid),
       transfer(decomposition, gas.grid, gas.halo,
                {.kernel = plan.scene.coupling->kernel,
-                .diameter = plan.scene.particles->diameter,
-                .particle_volume = plan.scene.particles->mass / plan.scene.particles->density,
-                .mass = plan.scene.particles->mass,
+                .diameter = plan.scene.particles->diameter(),
+                .particle_volume = plan.scene.particles->mass() / plan.scene.particles->types.front().density,
+                .mass = plan.scene.particles->mass(),
                 .gravity = plan.scene.gravity,
                 .fraction_floor = plan.scene.coupling->fraction_floor,
                 .scheme = plan.scene.coupling->scheme},
@@ -83,7 +77,7 @@ Simulation::Simulation(const Plan& plan, const Comm& comm, PhaseTimer& timer)
       decomposition_(comm, plan.cells, plan.scene.size, plan.scene.periodic, plan.tall, plan.narrowest),
       controller_(plan) {
   if (plan.scene.gas) gas_ = std::make_unique<GasPart>(decomposition_, plan_, timer_);
-  if (plan.scene.particles) dem_ = std::make_unique<Dem>(decomposition_, dem_setup(plan_), timer_);
+  if (plan.scene.particles) dem_ = std::make_unique<Dem>(decomposition_, dem_setup(plan_), plan.scene.particles->laws, timer_);
   if (plan.scene.coupling) coupling_ = std::make_unique<CouplingPart>(decomposition_, plan_, *gas_, timer_);
   audit_exchange_ =
       coupling_ && std::any_of(plan.scene.monitors.begin(), plan.scene.monitors.end(), [](const MonitorSetup& monitor) {
@@ -120,7 +114,7 @@ void Simulation::deposit_volume() {
 }
 
 void Simulation::find_drag() {
-  const DragScene scene{plan_.scene.gas->setup.density, plan_.scene.gas->setup.viscosity, plan_.scene.particles->diameter};
+  const DragScene scene{plan_.scene.gas->setup.density, plan_.scene.gas->setup.viscosity, plan_.scene.particles->diameter()};
   std::visit([&](const auto& law) { coupling_->transfer.find_drag(law, scene, dem_->particles(), gas_->state); },
              plan_.scene.coupling->drag);
 }
@@ -181,17 +175,13 @@ void Simulation::audit_exchange() {
 
 void Simulation::advance_particles(double dt) {
   const int substeps = substeps_in(dt);
-  const auto advance = [&](int count) {
-    std::visit([&](const auto& contact, const auto& tangential) { dem_->advance(count, dt / substeps, contact, tangential); },
-               plan_.scene.particles->contact, plan_.scene.particles->tangential);
-  };
   if (coupling_ && std::visit([](const auto& scheme) { return scheme.anew; }, plan_.scene.coupling->scheme)) {
     for (int substep = 0; substep < substeps; ++substep) {
       pull_anew();
-      advance(1);
+      dem_->advance(1, dt / substeps);
     }
   } else {
-    advance(substeps);
+    dem_->advance(substeps, dt / substeps);
   }
   substeps_ += static_cast<std::uint64_t>(substeps);
   max_overlap_ = dem_->take_max_overlap();
@@ -236,13 +226,16 @@ bool Simulation::settle() {
   if (!dem_ || !plan_.scene.particles->settling || particle_count_ == 0) return false;
   const Settling& settling = *plan_.scene.particles->settling;
   constexpr int substeps = 100;
-  std::visit([&](const auto& tangential) { dem_->advance(substeps, plan_.substep, settling.contact, tangential); },
-             plan_.scene.particles->tangential);
+  ContactLaws settling_laws = plan_.scene.particles->laws;
+  settling_laws.contact = settling.contact;
+  dem_->use(settling_laws);
+  dem_->advance(substeps, plan_.substep);
+  dem_->use(plan_.scene.particles->laws);
   settled_time_ += substeps * plan_.substep;
   dem_->take_max_overlap();
   // Not before the highest has had the time to fall: at the start all are slow.
   const double energy = decomposition_.comm().sum(dem_->kinetic_energy());
-  const double speed = std::sqrt(2 * energy / (static_cast<double>(particle_count_) * plan_.scene.particles->mass));
+  const double speed = std::sqrt(2 * energy / (static_cast<double>(particle_count_) * plan_.scene.particles->mass()));
   if (settled_time_ < settling.duration && (settled_time_ < plan_.fall_time || speed > settling.rest_velocity)) return true;
   if (coupling_) hidden_solids_ = coupling_->transfer.deposit_volume(dem_->particles(), gas_->state.fraction);
   for (GasResponse& response : dem_->particles().gas_response) response = {};  // no gas has been felt
@@ -264,8 +257,8 @@ Observation Simulation::observation() {
   now.momentum_residual = exchange_residual_;
   if (dem_) {
     now.particles = &dem_->particles();
-    now.radius = plan_.scene.particles->diameter / 2;
-    now.mass = plan_.scene.particles->mass;
+    now.radius = plan_.scene.particles->diameter() / 2;
+    now.mass = plan_.scene.particles->mass();
     now.max_overlap = max_overlap_;
   }
   return now;

@@ -83,6 +83,7 @@ class Simulation {
   void note(const std::string& change);
   void advance_particles(double dt);
   void audit_exchange();
+  void put_contacts(CheckpointContent& content) const;
   void restore_gas(const CheckpointReader& from);
   void restore_particles(const CheckpointReader& from);
 

@@ -88,11 +88,11 @@ CheckpointContent Simulation::checkpoint() const {
   if (dem_) {
     const ParticleStore& store = dem_->particles();
     const std::size_t n = store.owned;
-    content.numbers["particles/diameter"] = plan_.scene.particles->diameter;
+    content.numbers["particles/diameter"] = plan_.scene.particles->diameter();
     content.numbers["particles/count"] = static_cast<double>(particle_count_);
-    content.numbers["particles/total_mass"] = static_cast<double>(particle_count_) * plan_.scene.particles->mass;
+    content.numbers["particles/total_mass"] = static_cast<double>(particle_count_) * plan_.scene.particles->mass();
     Vec3 momentum;
-    for (std::size_t p = 0; p < n; ++p) momentum += plan_.scene.particles->mass * store.velocity(p);
+    for (std::size_t p = 0; p < n; ++p) momentum += plan_.scene.particles->mass() * store.velocity(p);
     for (int d = 0; d < 3; ++d) {
       content.numbers[std::string("particles/total_momentum_") + "xyz"[d]] = decomposition_.comm().sum(momentum[d]);
     }
@@ -112,28 +112,40 @@ CheckpointContent Simulation::checkpoint() const {
     content.arrays.push_back(rows("particles/position_at_rebuild", "m",
                                   "centres when the pair list was last built, as the ranks hold them",
                                   dem_->positions_at_rebuild()));
-    if (dem_->setup().history) {
-      std::vector<std::int64_t> pair_ids, wall_ids;
-      std::vector<Vec3> pair_displacements, wall_displacements;
-      for (const PairHistory& pair : dem_->pair_histories()) {
-        pair_ids.insert(pair_ids.end(), {pair.low, pair.high});
-        pair_displacements.push_back(pair.displacement);
-      }
-      for (const WallHistory& wall : dem_->wall_histories()) {
-        wall_ids.insert(wall_ids.end(), {wall.id, wall.wall});
-        wall_displacements.push_back(wall.displacement);
-      }
-      content.arrays.push_back(
-          {"contacts/pair", "", "ids of the two particles, lower first", std::move(pair_ids), std::nullopt, 2});
-      content.arrays.push_back(
-          rows("contacts/pair_displacement", "m", "tangential displacement ξ as the lower id sees it", pair_displacements));
-      content.arrays.push_back(
-          {"contacts/wall", "", "id of the particle, 2·direction + side of the wall", std::move(wall_ids), std::nullopt, 2});
-      content.arrays.push_back(
-          rows("contacts/wall_displacement", "m", "tangential displacement ξ as the particle sees it", wall_displacements));
+    if (dem_->setup().verlet) {
+      std::vector<Vec3> forces(n), torques(n);
+      for (std::size_t p = 0; p < n; ++p) forces[p] = store.previous[p].force, torques[p] = store.previous[p].torque();
+      content.arrays.push_back(rows("particles/contact_force", "N", "by contacts in the last sub-step", forces));
+      content.arrays.push_back(rows("particles/contact_torque", "N m", "by contacts in the last sub-step", torques));
     }
+    if (dem_->setup().history || dem_->setup().rolling_history) put_contacts(content);
   }
   return content;
+}
+
+// What contacts remember. A memory that the laws do not keep is 0.
+void Simulation::put_contacts(CheckpointContent& content) const {
+  std::vector<std::int64_t> pair_ids, wall_ids;
+  std::vector<Vec3> pair_displacements, pair_angles, wall_displacements, wall_angles;
+  for (const PairHistory& pair : dem_->pair_histories()) {
+    pair_ids.insert(pair_ids.end(), {pair.low, pair.high});
+    pair_displacements.push_back(pair.memory.displacement);
+    pair_angles.push_back(pair.memory.angle);
+  }
+  for (const WallHistory& wall : dem_->wall_histories()) {
+    wall_ids.insert(wall_ids.end(), {wall.id, wall.wall});
+    wall_displacements.push_back(wall.memory.displacement);
+    wall_angles.push_back(wall.memory.angle);
+  }
+  content.arrays.push_back({"contacts/pair", "", "ids of the two particles, lower first", std::move(pair_ids), std::nullopt, 2});
+  content.arrays.push_back(
+      rows("contacts/pair_displacement", "m", "tangential displacement ξ as the lower id sees it", pair_displacements));
+  content.arrays.push_back(rows("contacts/pair_angle", "rad", "rolling angle θ as the lower id sees it", pair_angles));
+  content.arrays.push_back(
+      {"contacts/wall", "", "id of the particle, 2·direction + side of the wall", std::move(wall_ids), std::nullopt, 2});
+  content.arrays.push_back(
+      rows("contacts/wall_displacement", "m", "tangential displacement ξ as the particle sees it", wall_displacements));
+  content.arrays.push_back(rows("contacts/wall_angle", "rad", "rolling angle θ as the particle sees it", wall_angles));
 }
 
 void Simulation::restore(const CheckpointReader& from) {
@@ -152,7 +164,7 @@ void Simulation::restore(const CheckpointReader& from) {
   if (from.has("gas/pressure") != static_cast<bool>(gas_) || from.has("particles/position") != static_cast<bool>(dem_)) {
     throw Stop(Reason::invalid_case, "the checkpoint is of another scene: gas and particles must be there in both or in neither");
   }
-  if (dem_) same("particles/diameter", "particles.diameter", plan_.scene.particles->diameter);
+  if (dem_) same("particles/diameter", "particles.diameter", plan_.scene.particles->diameter());
   steps_ = from.step();
   time_ = from.time();
   controller_.restore(from.number("controller/step_size"), static_cast<int>(from.number("controller/good_steps")));
@@ -193,21 +205,34 @@ void Simulation::restore_particles(const CheckpointReader& from) {
       for (std::size_t p = 0; p < store.owned; ++p) store.gas_response[p].debt = debts[p];
     }
   }
+  if (dem_->setup().verlet && from.has("particles/contact_force")) {
+    const std::vector<Vec3> forces = vectors(from.rows("particles/contact_force"));
+    const std::vector<Vec3> torques = vectors(from.rows("particles/contact_torque"));
+    store.previous.resize(store.owned);
+    for (std::size_t p = 0; p < store.owned; ++p) {
+      store.previous[p].add(forces[p], torques[p]);
+      store.previous[p].known = 1;
+    }
+  }
   std::vector<Vec3> at_rebuild;
   if (same_ranks) at_rebuild = vectors(from.rows("particles/position_at_rebuild"));
-  if (!same_ranks) store = redistribute(decomposition_, store);
+  if (!same_ranks) {
+    store.each_array(dem_->setup(), [&](auto& array) { array.resize(store.owned); });
+    store = redistribute(decomposition_, dem_->setup(), std::move(store));
+  }
 
   std::vector<PairHistory> pairs;
   std::vector<WallHistory> walls;
-  if (dem_->setup().history && from.has("contacts/pair")) {
+  if ((dem_->setup().history || dem_->setup().rolling_history) && from.has("contacts/pair")) {
     const std::vector<std::int64_t> pair_ids = from.integer_rows("contacts/pair"), wall_ids = from.integer_rows("contacts/wall");
     const std::vector<Vec3> pair_displacements = vectors(from.rows("contacts/pair_displacement"));
+    const std::vector<Vec3> pair_angles = vectors(from.rows("contacts/pair_angle"));
     const std::vector<Vec3> wall_displacements = vectors(from.rows("contacts/wall_displacement"));
-    for (std::size_t c = 0; c < pair_displacements.size(); ++c)
-      pairs.push_back({pair_ids[2 * c], pair_ids[2 * c + 1], pair_displacements[c]});
-    for (std::size_t c = 0; c < wall_displacements.size(); ++c) {
-      walls.push_back({wall_ids[2 * c], static_cast<int>(wall_ids[2 * c + 1]), wall_displacements[c]});
-    }
+    const std::vector<Vec3> wall_angles = vectors(from.rows("contacts/wall_angle"));
+    for (std::size_t c = 0; c < pair_angles.size(); ++c)
+      pairs.push_back({pair_ids[2 * c], pair_ids[2 * c + 1], {pair_displacements[c], pair_angles[c]}});
+    for (std::size_t c = 0; c < wall_angles.size(); ++c)
+      walls.push_back({wall_ids[2 * c], static_cast<int>(wall_ids[2 * c + 1]), {wall_displacements[c], wall_angles[c]}});
   }
   particle_count_ = decomposition_.comm().sum(static_cast<std::int64_t>(store.owned));
   dem_->restore(std::move(store), std::move(at_rebuild), pairs, walls);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "case/contact_scene.h"
 #include "case/seeding_scene.h"
 #include "case_file.h"
 
@@ -116,54 +117,25 @@ GasScene gas_scene(const v1::Case& from) {
 
 // ---- particles
 
-// Normal law between particles (m* = m/2) and on walls (m* = m).
-PairAndWall<LinearSpringDashpot> springs(const v1::LinearSpringDashpot& law, double mass, double restitution,
-                                         double wall_restitution) {
-  const double wall_stiffness = law.has_wall_stiffness() ? law.wall_stiffness() : law.stiffness();
-  return {LinearSpringDashpot::from_restitution(law.stiffness(), restitution, mass / 2),
-          LinearSpringDashpot::from_restitution(wall_stiffness, wall_restitution, mass)};
-}
-
-TangentialLaw tangential(const v1::Particles& from, const PairAndWall<LinearSpringDashpot>& normal) {
-  switch (from.tangential_case()) {
-    case v1::Particles::kCoulomb: {
-      const v1::Coulomb& law = from.coulomb();
-      return PairAndWall<Coulomb>{{law.friction()}, {law.has_wall_friction() ? law.wall_friction() : law.friction()}};
-    }
-    case v1::Particles::kSpring: {
-      const v1::TangentialSpring& law = from.spring();
-      const double wall_friction = law.has_wall_friction() ? law.wall_friction() : law.friction();
-      return PairAndWall<TangentialSpring>{
-          TangentialSpring::from_normal(law.friction(), normal.pair, law.stiffness_ratio(), law.damping_ratio()),
-          TangentialSpring::from_normal(wall_friction, normal.wall, law.stiffness_ratio(), law.damping_ratio())};
-    }
-    default:
-      return PairAndWall<Frictionless>{};
-  }
-}
-
 ParticleScene particle_scene(const v1::Case& from) {
   const v1::Particles& particles = from.particles();
-  const v1::LinearSpringDashpot& law = particles.linear_spring_dashpot();
-  const std::vector<SeedKind> kinds = seed_kinds(particles);
-  const double d = kinds.front().sizes.largest(), mass = kinds.front().density * std::numbers::pi / 6 * d * d * d;
-  const auto contact =
-      springs(law, mass, law.restitution(), law.has_wall_restitution() ? law.wall_restitution() : law.restitution());
   ParticleScene scene;
-  scene.kinds = kinds;
-  scene.regions = seed_regions(from, kinds);
+  scene.kinds = seed_kinds(particles);
+  scene.regions = seed_regions(from, scene.kinds);
+  std::vector<ContactType> types;
+  for (const SeedKind& kind : scene.kinds) {
+    types.push_back({kind.name, {kind.sizes.largest() / 2, kind.density, !kind.sizes.constant()}, kind.sizes.smallest() / 2});
+    scene.types.push_back(types.back().type);
+  }
+  scene.laws = contact_laws(particles, types);
   if (const v1::Settling* settling = settling_of(particles)) {
     scene.settling = Settling{settling->duration(), settling->rest_velocity(),
-                              springs(law, mass, settling->restitution(), settling->restitution())};
+                              contact_law_with(particles, types, settling->restitution())};
   }
-  scene.diameter = d;
-  scene.density = kinds.front().density;
-  scene.mass = mass;
-  scene.collision_time = std::min(contact.pair.collision_time(mass / 2), contact.wall.collision_time(mass));
+  scene.collision_time = collision_time(particles, scene.laws.contact, types);
   scene.steps_per_collision = particles.steps_per_collision();
   scene.skin = particles.skin();
-  scene.contact = contact;
-  scene.tangential = tangential(particles, contact);
+  scene.verlet = particles.has_velocity_verlet();
   return scene;
 }
 

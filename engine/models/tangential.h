@@ -1,8 +1,7 @@
-// Tangential contact laws: the force (N) on the first of two bodies in the tangent plane of their contact.
+// Tangential contact laws: the force (N) on the first of two bodies in the tangent plane of their contact. Each holds for one
+// contact (Real a double) or for a pack of them.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
 #include <variant>
 
 #include "base/vec3.h"
@@ -11,12 +10,14 @@
 namespace bedflow {
 
 // What every law needs to know of a contact.
+template <class Real>
 struct Sliding {
-  Vec3 normal;              // n, from the first body to the second
-  Vec3 velocity;            // Vt of the first body's surface relative to the second's, in the tangent plane, m/s
-  double normal_force = 0;  // |F_n|, N
-  double mass = 0;          // impulse over change of Vt, spins included, kg: 2/7 m* for solid spheres
-  double dt = 0;            // sub-step, s
+  Vector3<Real> normal;    // n, from the first body to the second
+  Vector3<Real> velocity;  // Vt of the first body's surface relative to the second's, in the tangent plane, m/s
+  Real normal_force;       // |F_n|, N
+  Real mass;               // impulse over change of Vt, spins included, kg: 2/7 m* for solid spheres
+  double dt = 0;           // sub-step, s
+  Touching<Real> touching;
 };
 
 // No tangential force: the particles do not rotate.
@@ -33,44 +34,82 @@ struct Coulomb {
   static constexpr bool rotation = true, history = false;
   double friction = 0;  // μf
 
-  Vec3 operator()(const Sliding& s) const {
-    // std::min returns its first argument when the second is 0/0.
-    return -std::min(s.mass / s.dt, friction * s.normal_force / norm(s.velocity)) * s.velocity;
+  template <class Real>
+  Vector3<Real> operator()(const Sliding<Real>& s) const {
+    return -min(s.mass / s.dt, friction * s.normal_force / norm(s.velocity)) * s.velocity;  // the first when the second is 0/0
   }
 };
 
-// Tangential spring with the contact's history (Cundall & Strack 1979):
-//   ξ turned into the present tangent plane, ξ += Vt dt,  F_t = −kt ξ − ηt Vt;
-//   beyond |F_t| = μf |F_n| it slips: F_t keeps its direction, and ξ becomes what gives this force.
-// Turning: projection on the plane, then back to the length it had, so that a pair that rolls as a whole neither loses nor
-// gains elastic energy (Luding 2008, Granular Matter 10, 235).
+// ξ turned into the plane normal to n: projection, then back to the length it had, so that a pair that rolls as a whole neither
+// loses nor gains elastic energy (Luding 2008, Granular Matter 10, 235).
+template <class Real>
+Vector3<Real> turned(Vector3<Real> displacement, Vector3<Real> normal) {
+  const Vector3<Real> in_plane = displacement - dot(displacement, normal) * normal;
+  const Real length2 = dot(in_plane, in_plane);
+  const Real stretch = sqrt(dot(displacement, displacement) / length2);
+  return select(length2 > 0, stretch, Real{}) * in_plane;
+}
+
+// A spring with memory, a dashpot and a limit (Cundall & Strack 1979):  ξ += rate dt,  trial = −k ξ − η rate;  beyond the limit
+// it slips: the trial keeps its direction, and ξ becomes what gives this force.
+template <class Real>
+Vector3<Real> stick_or_slip(Vector3<Real>& displacement, Vector3<Real> rate, double dt, Real stiffness, Real damping,
+                            Real limit) {
+  displacement += dt * rate;
+  const Vector3<Real> trial = -stiffness * displacement - damping * rate;
+  const Real size = norm(trial);
+  const auto sticks = size <= limit;
+  const Vector3<Real> slipping = limit / size * trial;
+  const Real softness = -1 / stiffness;
+  Vector3<Real> force;
+  for (int d = 0; d < 3; ++d) {
+    force[d] = select(sticks, trial[d], slipping[d]);
+    displacement[d] = select(sticks, displacement[d], softness * (slipping[d] + damping * rate[d]));
+  }
+  return force;
+}
+
+// Tangential spring with the contact's history (Cundall & Strack 1979):  F_t = −kt ξ − ηt Vt,  |F_t| ≤ μf |F_n|,  ξ turned with
+// n. kt and ηt are shares of the normal law's k and η.
 struct TangentialSpring {
   static constexpr const char* name = "spring";
   static constexpr bool rotation = true, history = true;
-  double friction = 0;   // μf
-  double stiffness = 0;  // kt, N/m
-  double damping = 0;    // ηt, kg/s
+  double friction = 0;         // μf
+  double stiffness = 0;        // kt, N/m
+  double damping_ratio = 0.5;  // ηt/η
+  LinearSpringDashpot normal;  // whose η that is
 
-  Vec3 operator()(const Sliding& s, Vec3& displacement) const {
-    const Vec3 in_plane = displacement - dot(displacement, s.normal) * s.normal;
-    const double length2 = dot(in_plane, in_plane);
-    const double stretch = length2 > 0 ? std::sqrt(dot(displacement, displacement) / length2) : 0;
-    displacement = stretch * in_plane + s.dt * s.velocity;
-    const Vec3 trial = -stiffness * displacement - damping * s.velocity;
-    const double limit = friction * s.normal_force, size = norm(trial);
-    if (size <= limit) return trial;
-    const Vec3 slipping = limit / size * trial;
-    displacement = -(1 / stiffness) * (slipping + damping * s.velocity);
-    return slipping;
+  template <class Real>
+  Vector3<Real> operator()(const Sliding<Real>& s, Vector3<Real>& displacement) const {
+    displacement = turned(displacement, s.normal);
+    return stick_or_slip(displacement, s.velocity, s.dt, broadcast<Real>(stiffness),
+                         damping_ratio * normal.damping(s.touching.mass), friction * s.normal_force);
   }
 
-  // kt and ηt as shares of the normal law's k and η.
   static TangentialSpring from_normal(double friction, const LinearSpringDashpot& normal, double stiffness_ratio = 2.0 / 7,
                                       double damping_ratio = 0.5) {
-    return {friction, stiffness_ratio * normal.stiffness, damping_ratio * normal.damping};
+    return {friction, stiffness_ratio * normal.stiffness, damping_ratio, normal};
   }
 };
 
-using Tangential = std::variant<Frictionless, Coulomb, TangentialSpring>;
+// Mindlin's tangential stiffness for Hertz's contact, in the form of Tsuji, Tanaka & Ishida (1992):
+//   F_t = −S_t ξ − 2 √(5/6) β √(S_t m*) Vt,  S_t = 8 G* √(R* δ),  |F_t| ≤ μf |F_n|,  ξ turned with n.
+struct Mindlin {
+  static constexpr const char* name = "mindlin";
+  static constexpr bool rotation = true, history = true;
+  double friction = 0;       // μf
+  double modulus = 0;        // G*, 1/G* = (2 − νi)/Gi + (2 − νj)/Gj,  G = E/(2(1 + ν)), Pa
+  double damping_share = 0;  // β of the normal law
+
+  template <class Real>
+  Vector3<Real> operator()(const Sliding<Real>& s, Vector3<Real>& displacement) const {
+    displacement = turned(displacement, s.normal);
+    const Real stiffness = 8 * modulus * sqrt(s.touching.radius * s.touching.overlap);
+    const Real damping = 2 * std::sqrt(5.0 / 6) * damping_share * sqrt(stiffness * s.touching.mass);
+    return stick_or_slip(displacement, s.velocity, s.dt, stiffness, damping, friction * s.normal_force);
+  }
+};
+
+using Tangential = std::variant<Frictionless, Coulomb, TangentialSpring, Mindlin>;
 
 }  // namespace bedflow

@@ -36,7 +36,7 @@ std::size_t Cells::cell_of(Vec3 place) const {
   return row(cell[1], cell[2]) + cell[0];
 }
 
-void Cells::sort(std::span<const Vec3> places, double edge) {
+void Cells::sort(std::span<const Vec3> places, double edge, std::uint32_t first_row) {
   cover(places, edge);
   start_.assign(static_cast<std::size_t>(count_[0]) * count_[1] * count_[2] + 1, 0);
   cell_.resize(places.size());
@@ -49,6 +49,7 @@ void Cells::sort(std::span<const Vec3> places, double edge) {
   for (std::size_t i = 0; i < places.size(); ++i) order_[start_[cell_[i]]++] = static_cast<std::uint32_t>(i);
   for (std::size_t c = start_.size() - 1; c > 0; --c) start_[c] = start_[c - 1];  // each was moved on to the next one's start
   start_[0] = 0;
+  for (std::uint32_t& start : start_) start += first_row;
 }
 
 }  // namespace bedflow

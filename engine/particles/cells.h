@@ -13,20 +13,22 @@ namespace bedflow {
 class Cells {
  public:
   // Covers the places with cells no narrower than `edge` (m), at most a few a particle; the longest direction runs slowest.
-  // Afterwards order()[new] = old, stable within a cell.
-  void sort(std::span<const Vec3> places, double edge);
+  // Afterwards order()[new] = old, stable within a cell. The places are those of the rows from first_row on, before and after.
+  void sort(std::span<const Vec3> places, double edge, std::uint32_t first_row = 0);
   const std::vector<std::uint32_t>& order() const { return order_; }
+  std::uint32_t first() const { return start_.front(); }
+  std::uint32_t last() const { return start_.back(); }
 
-  // Of sorted particles: visits the runs [first, last) of rows that stand in the 27 cells around a point anywhere.
+  // Of sorted particles: visits the runs [first, last) of rows that stand in the cells within `reach` (m) of a point anywhere.
   template <class Visit>
-  void around(Vec3 point, Visit visit) const {
+  void around(Vec3 point, double reach, Visit visit) const {
     Int3 low{}, high{};
     for (int d = 0; d < 3; ++d) {
-      const double cell = (point[axis_[d]] - low_[axis_[d]]) * per_edge_[d];
-      if (!(cell >= -1 && cell < count_[d] + 1)) return;  // further than a cell away from all
-      const int middle = static_cast<int>(cell + 1) - 1;  // rounds down
-      low[d] = std::max(middle - 1, 0);
-      high[d] = std::min(middle + 1, count_[d] - 1);
+      const double middle = point[axis_[d]] - low_[axis_[d]];
+      const double from = (middle - reach) * per_edge_[d], to = (middle + reach) * per_edge_[d];
+      if (!(to >= 0 && from < count_[d])) return;  // too far from all
+      low[d] = from > 0 ? static_cast<int>(from) : 0;
+      high[d] = to < count_[d] ? static_cast<int>(to) : count_[d] - 1;
     }
     for (int slow = low[2]; slow <= high[2]; ++slow)
       for (int j = low[1]; j <= high[1]; ++j) visit(start_[row(j, slow) + low[0]], start_[row(j, slow) + high[0] + 1]);

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <sstream>
 #include <unordered_map>
+#include <utility>
 
 #include "base/check.h"
 #include "particles/integrate.h"
@@ -13,28 +14,52 @@ namespace bedflow {
 namespace {
 
 template <class T>
-void reorder(std::vector<T>& rows, const std::vector<std::uint32_t>& order, std::vector<T>& scratch) {
-  if (rows.empty()) return;
-  scratch.resize(order.size());
-  for (std::size_t i = 0; i < order.size(); ++i) scratch[i] = rows[order[i]];
-  rows.swap(scratch);
+void reorder(std::vector<T>& elements, const std::vector<std::uint32_t>& order) {
+  std::vector<T> sorted(order.size());
+  for (std::size_t i = 0; i < order.size(); ++i) sorted[i] = elements[order[i]];
+  elements.swap(sorted);
+}
+
+// Calls run with the values as constants.
+template <class Run, bool... known>
+void with_constants(Run run, std::integer_sequence<bool, known...> constants) {
+  run(constants);
+}
+template <class Run, bool... known, class... Rest>
+void with_constants(Run run, std::integer_sequence<bool, known...>, bool next, Rest... rest) {
+  if (next) {
+    with_constants(run, std::integer_sequence<bool, known..., true>{}, rest...);
+  } else {
+    with_constants(run, std::integer_sequence<bool, known..., false>{}, rest...);
+  }
 }
 
 bool finite(Vec3 v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
+DemSetup required(DemSetup setup, const ContactLaws& laws) {
+  setup.rotation = laws.rotation();
+  setup.history = laws.history();
+  setup.rolling_history = laws.rolling_history();
+  setup.range = laws.range();
+  return setup;
+}
+
 }  // namespace
 
-Dem::Dem(const Decomposition& decomposition, const DemSetup& setup, PhaseTimer& timer)
+Dem::Dem(const Decomposition& decomposition, const DemSetup& setup, ContactLaws laws, PhaseTimer& timer)
     : decomposition_(decomposition),
-      setup_(setup),
+      setup_(required(setup, laws)),
+      laws_(std::move(laws)),
       timer_(timer),
       faces_(box_faces(decomposition.size())),
-      ghosts_(decomposition, reach()) {}
+      ghosts_(decomposition, reach()),
+      cells_(setup.types.size()) {}
 
-Bodies Dem::bodies() {
-  return {particles_, force_.data(), torque_.data(), particles_.owned, ghosts_.shifts().data()};
+void Dem::use(ContactLaws laws) {
+  CHECK(laws.history() <= setup_.history && laws.rolling_history() <= setup_.rolling_history && laws.range() <= setup_.range);
+  laws_ = std::move(laws);
 }
 
 // ---------------------------------------------------------------------------------------------------- state
@@ -43,7 +68,7 @@ void Dem::set_particles(ParticleStore particles) {
   restore(std::move(particles), {}, {}, {});
 }
 
-void Dem::restore(ParticleStore particles, std::vector<Vec3> positions_at_rebuild, const std::vector<PairHistory>& pairs,
+void Dem::restore(ParticleStore particles, const std::vector<Vec3>& positions_at_rebuild, const std::vector<PairHistory>& pairs,
                   const std::vector<WallHistory>& walls) {
   const PhaseTimer::Scope scope(timer_, Phase::pairs, particles.owned);
   const Comm& comm = decomposition_.comm();
@@ -52,7 +77,7 @@ void Dem::restore(ParticleStore particles, std::vector<Vec3> positions_at_rebuil
   if (!setup_.rotation)
     for (std::size_t i = 0; i < particles_.owned; ++i) particles_.set_spin(i, {});
   const bool fresh = !comm.any(!positions_at_rebuild.empty());
-  place_ = fresh ? particles_.positions() : std::move(positions_at_rebuild);
+  place_ = fresh ? particles_.positions() : positions_at_rebuild;
   failure_ = {};
   contacts_ = 0;
   look_for_lost(0);
@@ -60,18 +85,18 @@ void Dem::restore(ParticleStore particles, std::vector<Vec3> positions_at_rebuil
   if (stopped_) return;
 
   history_.clear(particles_.owned);
-  if (setup_.history) {
+  if (setup_.history || setup_.rolling_history) {
     std::vector<PairHistory> pairs_here = pairs;
     std::vector<WallHistory> walls_here = walls;
     redistribute(comm, particles_.id, pairs_here, walls_here);
     std::unordered_map<std::int64_t, std::size_t> row;
     for (std::size_t i = 0; i < particles_.owned; ++i) row[particles_.id[i]] = i;
     for (const PairHistory& pair : pairs_here) {
-      if (const auto low = row.find(pair.low); low != row.end()) history_.add(low->second, pair.high, pair.displacement);
-      if (const auto high = row.find(pair.high); high != row.end()) history_.add(high->second, pair.low, pair.displacement);
+      if (const auto low = row.find(pair.low); low != row.end()) history_.add(low->second, pair.high, pair.memory);
+      if (const auto high = row.find(pair.high); high != row.end()) history_.add(high->second, pair.low, -pair.memory);
     }
     for (const WallHistory& wall : walls_here)
-      history_.add(row.at(wall.id), ContactHistory::wall_contact(wall.wall), wall.displacement);
+      history_.add(row.at(wall.id), ContactHistory::wall_contact(wall.wall), wall.memory);
   }
   if (fresh) {
     migrate(decomposition_, setup_, particles_, history_);
@@ -80,45 +105,75 @@ void Dem::restore(ParticleStore particles, std::vector<Vec3> positions_at_rebuil
   build_list();
 }
 
+std::vector<Vec3> Dem::positions_at_rebuild() const {
+  return {place_.begin(), place_.begin() + static_cast<std::ptrdiff_t>(particles_.owned)};
+}
+
 std::vector<PairHistory> Dem::pair_histories() const {
   std::vector<PairHistory> result;
-  for (std::size_t p = 0; p < list_.pair_history.size(); ++p) {
-    const auto [low, high] = list_.pairs[p];
-    if (low < particles_.owned && list_.pair_history[p] != Vec3{})
-      result.push_back({particles_.id[low], particles_.id[high], list_.pair_history[p]});
-  }
+  list_.each_pair_memory(now_, [&](std::size_t p, const ContactMemory& memory) {
+    const auto [first, second] = list_.pairs[p];
+    if (first >= particles_.owned) return;
+    const std::int64_t a = particles_.id[first], b = particles_.id[second];
+    result.push_back(a < b ? PairHistory{a, b, memory} : PairHistory{b, a, -memory});
+  });
   return result;
 }
 
 std::vector<WallHistory> Dem::wall_histories() const {
   std::vector<WallHistory> result;
-  for (std::size_t w = 0; w < list_.wall_history.size(); ++w)
-    if (list_.wall_history[w] != Vec3{})
-      result.push_back({particles_.id[list_.near[w].particle], list_.near[w].face, list_.wall_history[w]});
+  list_.each_wall_memory(now_, [&](std::size_t w, const ContactMemory& memory) {
+    result.push_back({particles_.id[list_.near[w].particle], list_.near[w].face, memory});
+  });
   return result;
 }
 
 double Dem::take_max_overlap() {
-  const double result = max_overlap();
-  deepest_ = 0;
-  return result;
+  return std::exchange(deepest_, 0);
 }
 
 double Dem::kinetic_energy() const {
-  double translation = 0, rotation = 0;
+  double energy = 0;
   for (std::size_t i = 0; i < particles_.owned; ++i) {
-    translation += dot(particles_.velocity(i), particles_.velocity(i));
-    rotation += dot(particles_.spin(i), particles_.spin(i));
+    const double mass = mass_of(setup_, particles_, i), inertia = inertia_of(mass, radius_of(setup_, particles_, i));
+    const Vec3 v = particles_.velocity(i), spin = particles_.spin(i);
+    energy += 0.5 * (mass * dot(v, v) + inertia * dot(spin, spin));
   }
-  return 0.5 * (setup_.mass * translation + setup_.inertia() * rotation);
+  return energy;
 }
 
 // ---------------------------------------------------------------------------------------------------- pair list
 
+// An array that was not given is filled: gas forces with 0, types with the first, radii with the type's.
 void Dem::drop_ghosts() {
-  particles_.resize(particles_.owned);
-  particles_.gas_force.resize(setup_.gas != GasForce::none ? particles_.owned : 0);
-  particles_.gas_response.resize(setup_.gas == GasForce::relaxed ? particles_.owned : 0);
+  const std::size_t given = particles_.radius.size();
+  particles_.each_array(setup_, [&](auto& array) { array.resize(particles_.owned); });
+  if (setup_.gas == GasForce::none) particles_.gas_force.clear();
+  if (setup_.gas != GasForce::relaxed) particles_.gas_response.clear();
+  if (setup_.distributed())
+    for (std::size_t i = given; i < particles_.owned; ++i) particles_.radius[i] = type_of(setup_, particles_, i).radius;
+}
+
+// Chooses the ghosts anew, by the places of the owned particles.
+void Dem::take_ghosts() {
+  const PhaseTimer::Scope scope(timer_, Phase::migration, particles_.owned);
+  place_.resize(particles_.owned);
+  ghosts_.choose(place_, particles_.id);
+  const std::size_t all = place_.size();
+  particles_.rows.resize(all);
+  particles_.spin_z.resize(all);
+  forward_ghosts();
+  if (setup_.types.size() > 1) {
+    std::vector<double> types(particles_.type.begin(), particles_.type.end());
+    types.resize(all);
+    ghosts_.forward({{{types.data(), 1, 1}}});
+    particles_.type.resize(all);
+    for (std::size_t i = particles_.owned; i < all; ++i) particles_.type[i] = static_cast<std::uint8_t>(types[i]);
+  }
+  if (setup_.distributed()) {
+    particles_.radius.resize(all);
+    ghosts_.forward({{{particles_.radius.data(), 1, 1}}});
+  }
 }
 
 void Dem::forward_ghosts() {
@@ -130,11 +185,7 @@ void Dem::forward_ghosts() {
 
 void Dem::rebuild() {
   const PhaseTimer::Scope scope(timer_, Phase::pairs, particles_.owned);
-  if (setup_.history) {
-    list_.save(particles_, history_);
-  } else {
-    history_.clear(particles_.owned);
-  }
+  list_.save(particles_, now_, history_);
   drop_ghosts();
   {
     const PhaseTimer::Scope migration(timer_, Phase::migration, particles_.owned);
@@ -145,34 +196,32 @@ void Dem::rebuild() {
   ++rebuilds_;
 }
 
-// Sorts by the places at the rebuild, which leaves a stored order as it is, and builds the list from them.
-void Dem::build_list() {
-  cells_.sort(place_, reach());
-  for (auto* vectors : {&particles_.gas_force, &place_}) reorder(*vectors, cells_.order(), scratch_);
-  std::vector<ParticleRow> rows;
-  std::vector<double> spins_z;
-  std::vector<std::int64_t> ids;
-  reorder(particles_.rows, cells_.order(), rows);
-  reorder(particles_.spin_z, cells_.order(), spins_z);
-  std::vector<std::int32_t> heads;
-  reorder(particles_.id, cells_.order(), ids);
-  reorder(history_.heads(), cells_.order(), heads);
-  std::vector<GasResponse> responses;
-  reorder(particles_.gas_response, cells_.order(), responses);
-
-  all_places_ = place_;
-  {
-    const PhaseTimer::Scope scope(timer_, Phase::migration, particles_.owned);
-    ghosts_.choose(all_places_, particles_.id);
-    particles_.rows.resize(all_places_.size());
-    particles_.spin_z.resize(all_places_.size());
-    forward_ghosts();
+// By type, and in space by the places at the rebuild, which leaves a stored order as it is.
+void Dem::sort() {
+  std::vector<std::vector<std::uint32_t>> members(setup_.types.size());
+  for (std::size_t i = 0; i < particles_.owned; ++i)
+    members[particles_.type.empty() ? 0 : particles_.type[i]].push_back(static_cast<std::uint32_t>(i));
+  std::vector<std::uint32_t> order;
+  std::vector<Vec3> places;
+  for (std::size_t type = 0; type < members.size(); ++type) {
+    places.clear();
+    for (const std::uint32_t i : members[type]) places.push_back(place_[i]);
+    const double edge = 2 * setup_.types[type].radius + setup_.range + setup_.skin;
+    cells_[type].sort(places, edge, static_cast<std::uint32_t>(order.size()));
+    for (const std::uint32_t k : cells_[type].order()) order.push_back(members[type][k]);
   }
-  list_.build(cells_, setup_, faces_, particles_, all_places_, ghosts_.shifts());
-  if (setup_.history) list_.load(particles_, history_);
-  touching_.resize(list_.pairs.size());
+  particles_.each_array(setup_, [&](auto& array) { reorder(array, order); });
+  reorder(place_, order);
+  reorder(history_.heads(), order);
+}
+
+void Dem::build_list() {
+  sort();
+  take_ghosts();
+  list_.build(cells_, setup_, faces_, particles_, place_, ghosts_.shifts());
+  list_.load(particles_, now_, history_);
   force_.assign(particles_.owned, {});
-  torque_.assign(setup_.rotation ? particles_.owned : 0, {});
+  place_.push_back({});
 }
 
 // Rebuilds the list on all ranks when a particle of any has moved half a skin; else the ghosts follow their owners.
@@ -230,50 +279,57 @@ bool Dem::judge(std::size_t row, double dt) {
 
 // ---------------------------------------------------------------------------------------------------- sub-steps
 
-template <class Contact, class Tangential>
-void Dem::advance(int substeps, double dt, const PairAndWall<Contact>& contact, const PairAndWall<Tangential>& tangential) {
-  CHECK(setup_.rotation || !Tangential::rotation);
-  CHECK(setup_.history || !Tangential::history);
-  constexpr bool rotation = Tangential::rotation, history = Tangential::history;
-  const double radius = setup_.radius, mass = setup_.mass;
+void Dem::advance(int substeps, double dt) {
   for (int substep = 0; substep < substeps && !stopped_; ++substep) {
-    const std::size_t count = particles_.owned;
-    const Bodies rows = bodies();
-    {
-      const PhaseTimer::Scope scope(timer_, Phase::contacts, count);
-      const auto sweep = [&]<bool with_ghost>(std::size_t first, std::size_t last) {
-        const std::size_t n = find_touching<with_ghost, history>(list_, first, last, rows, 2 * radius, touching_.data());
-        deepest_ = std::max(
-            deepest_, sweep_pairs<with_ghost>(list_, touching_.data(), n, rows, contact.pair, tangential.pair, radius, mass, dt));
-        return n;
-      };
-      contacts_ = static_cast<std::int64_t>(sweep.template operator()<false>(0, list_.across));
-      const std::size_t across = sweep.template operator()<true>(list_.across, list_.pairs.size());
-      for (std::size_t c = 0; c < across; ++c) contacts_ += list_.pairs[touching_[c]].low < count;
-    }
-    {
-      const PhaseTimer::Scope scope(timer_, Phase::walls, count);
-      const WallSweep walls = sweep_walls(list_, faces_, setup_, rows, contact.wall, tangential.wall, dt);
-      deepest_ = std::max(deepest_, walls.deepest);
-      if (walls.passed) look_for_lost(dt);
-    }
-    bool far = false;
-    {
-      const PhaseTimer::Scope scope(timer_, Phase::integration, count);
-      const double limit = 0.5 * setup_.skin;
-      const auto advance = [&]<GasForce gas> {
-        return integrate<rotation, gas>(setup_, particles_, force_, torque_, place_, limit, dt);
-      };
-      far = setup_.gas == GasForce::none     ? advance.template operator()<GasForce::none>()
-            : setup_.gas == GasForce::frozen ? advance.template operator()<GasForce::frozen>()
-                                             : advance.template operator()<GasForce::relaxed>();
-    }
-    keep_list_valid(far, dt);
+    ++now_;
+    const Bodies bodies{
+        particles_.rows.data(), particles_.spin_z.data(), particles_.owned, force_.data(), ghosts_.shifts().data(), dt, now_};
+    contacts(bodies);
+    walls(bodies);
+    keep_list_valid(move(dt), dt);
   }
 }
 
-template void Dem::advance(int, double, const PairAndWall<LinearSpringDashpot>&, const PairAndWall<Frictionless>&);
-template void Dem::advance(int, double, const PairAndWall<LinearSpringDashpot>&, const PairAndWall<Coulomb>&);
-template void Dem::advance(int, double, const PairAndWall<LinearSpringDashpot>&, const PairAndWall<TangentialSpring>&);
+void Dem::contacts(const Bodies& bodies) {
+  const PhaseTimer::Scope scope(timer_, Phase::contacts, particles_.owned);
+  const SweepResult pairs = add_pair_forces(list_, setup_, particles_, bodies, laws_);
+  deepest_ = std::max(deepest_, pairs.deepest);
+  contacts_ = pairs.contacts;
+  add_rolling_torques(list_, faces_, setup_, particles_, bodies, laws_);
+  add_cohesion_forces(list_, faces_, setup_, particles_, bodies, laws_);
+}
+
+void Dem::walls(const Bodies& bodies) {
+  const PhaseTimer::Scope scope(timer_, Phase::walls, particles_.owned);
+  const WallResult result = add_wall_forces(list_, faces_, setup_, particles_, bodies, laws_);
+  deepest_ = std::max(deepest_, result.deepest);
+  if (result.passed) look_for_lost(bodies.dt);
+}
+
+// Returns whether a particle is half a skin from its place at the rebuild.
+bool Dem::move(double dt) {
+  const PhaseTimer::Scope scope(timer_, Phase::integration, particles_.owned);
+  bool far = false;
+  for (std::size_t type = 0; type < cells_.size(); ++type) {
+    const auto with = [&]<GasForce gas>() {
+      const auto run = [&]<bool... parts>(std::integer_sequence<bool, parts...>) {
+        far |= integrate<gas, parts...>(setup_, setup_.types[type], cells_[type].first(), cells_[type].last(), particles_,
+                                        force_.data(), place_.data(), 0.5 * setup_.skin, dt);
+      };
+      with_constants(run, std::integer_sequence<bool>{}, setup_.rotation, setup_.verlet, setup_.types[type].distributed);
+    };
+    switch (setup_.gas) {
+      case GasForce::none:
+        with.operator()<GasForce::none>();
+        break;
+      case GasForce::frozen:
+        with.operator()<GasForce::frozen>();
+        break;
+      case GasForce::relaxed:
+        with.operator()<GasForce::relaxed>();
+    }
+  }
+  return far;
+}
 
 }  // namespace bedflow

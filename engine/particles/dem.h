@@ -12,23 +12,19 @@
 #include "parallel/decomposition.h"
 #include "parallel/ghosts.h"
 #include "particles/cells.h"
-#include "particles/contact_sweep.h"
+#include "particles/forces.h"
 #include "particles/history.h"
+#include "particles/laws.h"
 #include "particles/pair_list.h"
 #include "particles/store.h"
 
 namespace bedflow {
 
-// A law with its parameters for two particles and for a particle on a wall.
-template <class Law>
-struct PairAndWall {
-  Law pair, wall;
-};
-
 class Dem {
  public:
   // Collective. Throws Stop(invalid_case) when a block, or a periodic direction, is narrower than the reach of its particles.
-  Dem(const Decomposition& decomposition, const DemSetup& setup, PhaseTimer& timer);
+  // What the laws require (rotation, memory, range) is added to the setup.
+  Dem(const Decomposition& decomposition, const DemSetup& setup, ContactLaws laws, PhaseTimer& timer);
 
   const DemSetup& setup() const { return setup_; }
   const ParticleStore& particles() const { return particles_; }
@@ -37,16 +33,17 @@ class Dem {
   // Replaces all particles of this rank, each inside this rank's block (ghosts are made here). Collective.
   void set_particles(ParticleStore particles);
 
-  // n sub-steps of dt (s): contact sweep, walls, integrate; then pairs (rebuilt only when needed) or ghosts; symplectic Euler.
-  // Explicitly instantiated for every law of models/ in dem.cpp. Collective. After a failure on any rank no rank moves on.
-  template <class Contact, class Tangential>
-  void advance(int substeps, double dt, const PairAndWall<Contact>& contact, const PairAndWall<Tangential>& tangential);
+  // Other parameters of laws that require no more than the present ones, from the next sub-step on.
+  void use(ContactLaws laws);
+  // Sub-steps of dt (s): contacts, walls, motion; then pairs (rebuilt only when needed) or ghosts. Collective. After a failure on
+  // any rank no rank moves on.
+  void advance(int substeps, double dt);
 
-  // Largest overlap since the last take, over the diameter, this rank.
+  // Largest overlap since the last take, over the sum of the two radii (on a wall the diameter), this rank.
   double take_max_overlap();
-  double max_overlap() const { return deepest_ / (2 * setup_.radius); }
-  // Touching pairs in the last sub-step; a pair across ranks is counted by the owner of its lower id.
-  std::int64_t contacts() const { return contacts_; }
+  double max_overlap() const { return deepest_; }
+  // Touching pairs in the last sub-step; a pair across ranks is counted by one of them.
+  std::int64_t contact_count() const { return contacts_; }
   std::int64_t rebuilds() const { return rebuilds_; }  // of the pair list since construction
   // PARTICLE_LOST (id, place), DIVERGED (not finite, or further than its diameter in one sub-step): noted on this rank, to be
   // voted on.
@@ -54,40 +51,44 @@ class Dem {
   double kinetic_energy() const;  // J, this rank, translation and rotation
 
   // What a checkpoint must hold beside the particles so that the same ranks go on with the same bits: the places at the
-  // last rebuild of the pair list, and the histories of touching contacts. A pair across ranks is told by the owner of `low`.
-  const std::vector<Vec3>& positions_at_rebuild() const { return place_; }  // owned
+  // last rebuild of the pair list, and the histories of touching contacts. A pair across ranks is told by one of them.
+  std::vector<Vec3> positions_at_rebuild() const;  // owned
   std::vector<PairHistory> pair_histories() const;
   std::vector<WallHistory> wall_histories() const;
   // Same ranks: particles in their stored order with their places at the last rebuild; rebuilds exactly that list.
   // Other ranks: positions_at_rebuild empty on all, a fresh list; the particles are this block's (redistribute() in migration.h).
   // Histories: of all ranks together those of all contacts, each told by any rank, once. Collective.
-  void restore(ParticleStore particles, std::vector<Vec3> positions_at_rebuild, const std::vector<PairHistory>& pairs,
+  void restore(ParticleStore particles, const std::vector<Vec3>& positions_at_rebuild, const std::vector<PairHistory>& pairs,
                const std::vector<WallHistory>& walls);
 
  private:
-  double reach() const { return 2 * setup_.radius + setup_.skin; }
-  Bodies bodies();
+  double reach() const { return 2 * setup_.largest_radius() + setup_.range + setup_.skin; }
   void drop_ghosts();
+  void take_ghosts();
   void forward_ghosts();
+  void sort();
   void rebuild();
   void build_list();
   void keep_list_valid(bool far, double dt);
+  void contacts(const Bodies& bodies);
+  void walls(const Bodies& bodies);
+  bool move(double dt);
   void look_for_lost(double dt);
   bool judge(std::size_t row, double dt);
 
   const Decomposition& decomposition_;
   DemSetup setup_;
+  ContactLaws laws_;
   PhaseTimer& timer_;
   std::array<Plane, 6> faces_;
   GhostExchange ghosts_;
   ParticleStore particles_;
-  std::vector<Vec3> place_;           // owned, at the last rebuild
-  std::vector<Vec3> force_, torque_;  // owned, 0 between sub-steps
-  Cells cells_;
+  std::vector<Vec3> place_;      // at the last rebuild: owned, ghosts, and one more that is none
+  std::vector<ForceRow> force_;  // owned, 0 between sub-steps
+  std::vector<Cells> cells_;     // of each type
   PairList list_;
-  ContactHistory history_;               // only while the list is rebuilt
-  std::vector<std::uint32_t> touching_;  // of list_.pairs
-  std::vector<Vec3> scratch_, all_places_;
+  ContactHistory history_;  // only while the list is rebuilt
+  double now_ = 0;          // number of the last sub-step
   double deepest_ = 0;
   std::int64_t contacts_ = 0, rebuilds_ = 0;
   Failure failure_;

@@ -1,5 +1,5 @@
-// The tangential displacements of touching contacts, held by particle while the pair list that holds them by pair is rebuilt
-// or particles change rank.
+// The memory of touching contacts, held by particle while the pair list that holds it by pair is rebuilt or particles change
+// rank.
 #pragma once
 
 #include <cstdint>
@@ -9,16 +9,23 @@
 
 namespace bedflow {
 
-// Tangential displacement ξ (m) of a touching contact, by the ids of its particles (low < high), or of a particle and the wall
-// 2·direction + side.
+// What a contact remembers, as seen by one of its bodies: the other one sees the opposite.
+struct ContactMemory {
+  Vec3 displacement;  // tangential ξ, m
+  Vec3 angle;         // rolling θ, rad
+
+  ContactMemory operator-() const { return {-displacement, -angle}; }
+};
+
+// Memory of a touching contact, by the ids of its particles (low < high), or of a particle and the wall 2·direction + side.
 struct PairHistory {
   std::int64_t low, high;
-  Vec3 displacement;  // as seen by `low`
+  ContactMemory memory;  // as seen by `low`
 };
 struct WallHistory {
   std::int64_t id;
   int wall;
-  Vec3 displacement;
+  ContactMemory memory;  // as seen by the particle
 };
 
 // A chain of contacts for each owned particle. A pair of two owned particles stands in both chains, so a particle that leaves
@@ -26,8 +33,8 @@ struct WallHistory {
 class ContactHistory {
  public:
   struct Contact {
-    std::int64_t other;  // id of the other particle, or wall_contact(wall)
-    Vec3 displacement;   // as seen by the lower id of a pair
+    std::int64_t other;    // id of the other particle, or wall_contact(wall)
+    ContactMemory memory;  // as seen by the particle whose chain this is
     std::int32_t next;
   };
   static constexpr std::int64_t wall_contact(int wall) { return -1 - wall; }
@@ -41,15 +48,15 @@ class ContactHistory {
     head_.push_back(none);
     return head_.size() - 1;
   }
-  void add(std::size_t particle, std::int64_t other, Vec3 displacement) {
-    contacts_.push_back({other, displacement, head_[particle]});
+  void add(std::size_t particle, std::int64_t other, const ContactMemory& memory) {
+    contacts_.push_back({other, memory, head_[particle]});
     head_[particle] = static_cast<std::int32_t>(contacts_.size()) - 1;
   }
-  // 0 for a contact that is not known.
-  Vec3 find(std::size_t particle, std::int64_t other) const {
+  // Null for a contact that is not known.
+  const ContactMemory* find(std::size_t particle, std::int64_t other) const {
     for (std::int32_t c = head_[particle]; c != none; c = contacts_[c].next)
-      if (contacts_[c].other == other) return contacts_[c].displacement;
-    return {};
+      if (contacts_[c].other == other) return &contacts_[c].memory;
+    return nullptr;
   }
   template <class Apply>
   void for_each(std::size_t particle, Apply apply) const {

@@ -1,5 +1,6 @@
 #include "particles/migration.h"
 
+#include <array>
 #include <bit>
 #include <unordered_map>
 #include <unordered_set>
@@ -14,10 +15,6 @@ double packed(std::int64_t value) {
   return std::bit_cast<double>(value);
 }
 
-void put(Message& message, Vec3 v) {
-  message.insert(message.end(), {v.x, v.y, v.z});
-}
-
 // Reads a message from its front.
 class Reader {
  public:
@@ -25,9 +22,15 @@ class Reader {
   explicit operator bool() const { return next_ != end_; }
   double number() { return *next_++; }
   std::int64_t integer() { return std::bit_cast<std::int64_t>(number()); }
-  Vec3 vector() {
-    next_ += 3;
-    return {next_[-3], next_[-2], next_[-1]};
+  template <class T>
+  T element() {
+    if constexpr (std::is_same_v<T, std::uint8_t>) {
+      return static_cast<std::uint8_t>(integer());
+    } else {
+      std::array<double, sizeof(T) / sizeof(double)> doubles;
+      for (double& value : doubles) value = number();
+      return std::bit_cast<T>(doubles);
+    }
   }
 
  private:
@@ -35,35 +38,22 @@ class Reader {
   const double* end_;
 };
 
-void put_particle(Message& message, const ParticleStore& store, std::size_t i, GasForce gas) {
-  message.push_back(packed(store.id[i]));
-  put(message, store.position(i));
-  put(message, store.velocity(i));
-  put(message, store.spin(i));
-  if (gas != GasForce::none) put(message, store.gas_force[i]);
-  if (gas == GasForce::relaxed) {
-    message.insert(message.end(), {store.gas_response[i].drag, store.gas_response[i].share});
-    put(message, store.gas_response[i].debt);
-  }
+// An element of one of the store's arrays.
+void put_element(Message& message, std::uint8_t type) {
+  message.push_back(packed(type));
+}
+template <class T>
+void put_element(Message& message, const T& element) {
+  const auto doubles = std::bit_cast<std::array<double, sizeof(T) / sizeof(double)>>(element);
+  message.insert(message.end(), doubles.begin(), doubles.end());
 }
 
-void take_particle(Reader& reader, ParticleStore& store, GasForce gas) {
-  const std::int64_t id = reader.integer();
-  const Vec3 position = reader.vector(), velocity = reader.vector(), spin = reader.vector();
-  store.add(id, position, velocity, spin);
-  if (gas != GasForce::none) store.gas_force.push_back(reader.vector());
-  if (gas == GasForce::relaxed) {
-    const double drag = reader.number(), share = reader.number();
-    store.gas_response.push_back({drag, share, reader.vector()});
-  }
+void put_particle(Message& message, const DemSetup& setup, ParticleStore& store, std::size_t i) {
+  store.each_array(setup, [&](auto& array) { put_element(message, array[i]); });
 }
-
-void move_particle(ParticleStore& store, std::size_t from, std::size_t to, GasForce gas) {
-  store.rows[to] = store.rows[from];
-  store.spin_z[to] = store.spin_z[from];
-  store.id[to] = store.id[from];
-  if (gas != GasForce::none) store.gas_force[to] = store.gas_force[from];
-  if (gas == GasForce::relaxed) store.gas_response[to] = store.gas_response[from];
+void take_particle(Reader& reader, const DemSetup& setup, ParticleStore& store) {
+  store.each_array(setup, [&]<class T>(std::vector<T>& array) { array.push_back(reader.element<T>()); });
+  store.owned = store.rows.size();
 }
 
 // One stage: out of the block on one side of one direction.
@@ -82,39 +72,37 @@ class Stage {
 };
 
 // Moves the rows that leave into the message and closes the gaps, in order.
-void take_leaving(const Stage& stage, ParticleStore& store, ContactHistory& history, GasForce gas, Message& message) {
+void take_leaving(const Stage& stage, const DemSetup& setup, ParticleStore& store, ContactHistory& history, Message& message) {
   std::size_t kept = 0;
   for (std::size_t i = 0; i < store.id.size(); ++i) {
     if (!stage.leaves(store.position(i))) {
-      move_particle(store, i, kept, gas);
+      store.each_array(setup, [&](auto& array) { array[kept] = array[i]; });
       history.heads()[kept++] = history.heads()[i];
       continue;
     }
     store.position(i) = stage.arrival(store.position(i));
-    put_particle(message, store, i, gas);
+    put_particle(message, setup, store, i);
     const std::size_t length_at = message.size();
     message.push_back(0);
     std::int64_t contacts = 0;
     history.for_each(i, [&](const ContactHistory::Contact& contact) {
       message.push_back(packed(contact.other));
-      put(message, contact.displacement);
+      put_element(message, contact.memory);
       ++contacts;
     });
     message[length_at] = packed(contacts);
   }
-  store.resize(kept);
-  if (gas != GasForce::none) store.gas_force.resize(kept);
-  if (gas == GasForce::relaxed) store.gas_response.resize(kept);
+  store.each_array(setup, [&](auto& array) { array.resize(kept); });
   history.heads().resize(kept);
 }
 
-void append(const Message& message, ParticleStore& store, ContactHistory& history, GasForce gas) {
+void append(const Message& message, const DemSetup& setup, ParticleStore& store, ContactHistory& history) {
   for (Reader reader(message); reader;) {
-    take_particle(reader, store, gas);
+    take_particle(reader, setup, store);
     const std::size_t row = history.append_particle();
     for (std::int64_t contacts = reader.integer(); contacts > 0; --contacts) {
       const std::int64_t other = reader.integer();
-      history.add(row, other, reader.vector());
+      history.add(row, other, reader.element<ContactMemory>());
     }
   }
 }
@@ -129,25 +117,20 @@ void migrate(const Decomposition& decomposition, const DemSetup& setup, Particle
       const int to = decomposition.neighbour(d, side), from = decomposition.neighbour(d, 1 - side);
       if (to < 0 && from < 0) continue;
       send.clear();
-      if (to >= 0) take_leaving(Stage(decomposition, d, side), particles, history, setup.gas, send);
+      if (to >= 0) take_leaving(Stage(decomposition, d, side), setup, particles, history, send);
       comm.exchange(to, send, from, receive);
-      append(receive, particles, history, setup.gas);
+      append(receive, setup, particles, history);
     }
   particles.owned = particles.rows.size();
 }
 
-ParticleStore redistribute(const Decomposition& decomposition, const ParticleStore& particles) {
-  const Comm& comm = decomposition.comm();
-  const auto any_has = [&](const auto& rows) { return comm.any(!rows.empty()); };  // an empty rank cannot tell
-  const GasForce gas = any_has(particles.gas_response) ? GasForce::relaxed
-                       : any_has(particles.gas_force)  ? GasForce::frozen
-                                                       : GasForce::none;
-  std::vector<Message> messages(comm.size());
+ParticleStore redistribute(const Decomposition& decomposition, const DemSetup& setup, ParticleStore particles) {
+  std::vector<Message> messages(decomposition.comm().size());
   for (std::size_t i = 0; i < particles.owned; ++i)
-    put_particle(messages[decomposition.owner(particles.position(i))], particles, i, gas);
+    put_particle(messages[decomposition.owner(particles.position(i))], setup, particles, i);
   ParticleStore result;
-  for (const Message& message : comm.exchange_all(messages))
-    for (Reader reader(message); reader;) take_particle(reader, result, gas);
+  for (const Message& message : decomposition.comm().exchange_all(messages))
+    for (Reader reader(message); reader;) take_particle(reader, setup, result);
   return result;
 }
 
@@ -155,18 +138,19 @@ ParticleStore redistribute(const Decomposition& decomposition, const ParticleSto
 void redistribute(const Comm& comm, const std::vector<std::int64_t>& ids, std::vector<PairHistory>& pairs,
                   std::vector<WallHistory>& walls) {
   const auto clerk = [&](std::int64_t id) { return static_cast<std::size_t>(id % comm.size()); };
-  const auto write = [](Message& message, std::int64_t key, std::int64_t first, std::int64_t second, Vec3 displacement) {
+  const auto write = [](Message& message, std::int64_t key, std::int64_t first, std::int64_t second,
+                        const ContactMemory& memory) {
     message.insert(message.end(), {packed(key), packed(first), packed(second)});
-    put(message, displacement);
+    put_element(message, memory);
   };
   std::vector<Message> owned(comm.size()), sent(comm.size()), forwarded(comm.size());
   for (const std::int64_t id : ids) owned[clerk(id)].push_back(packed(id));
   for (const PairHistory& pair : pairs) {
-    write(sent[clerk(pair.low)], pair.low, pair.low, pair.high, pair.displacement);
-    write(sent[clerk(pair.high)], pair.high, pair.low, pair.high, pair.displacement);
+    write(sent[clerk(pair.low)], pair.low, pair.low, pair.high, pair.memory);
+    write(sent[clerk(pair.high)], pair.high, pair.low, pair.high, pair.memory);
   }
   for (const WallHistory& wall : walls)
-    write(sent[clerk(wall.id)], wall.id, wall.id, ContactHistory::wall_contact(wall.wall), wall.displacement);
+    write(sent[clerk(wall.id)], wall.id, wall.id, ContactHistory::wall_contact(wall.wall), wall.memory);
 
   std::unordered_map<std::int64_t, int> owner;
   const auto registered = comm.exchange_all(owned);
@@ -175,9 +159,8 @@ void redistribute(const Comm& comm, const std::vector<std::int64_t>& ids, std::v
   for (const Message& message : comm.exchange_all(sent))
     for (Reader reader(message); reader;) {
       const std::int64_t key = reader.integer(), first = reader.integer(), second = reader.integer();
-      const Vec3 displacement = reader.vector();
-      if (const auto found = owner.find(key); found != owner.end())
-        write(forwarded[found->second], key, first, second, displacement);
+      const auto memory = reader.element<ContactMemory>();
+      if (const auto found = owner.find(key); found != owner.end()) write(forwarded[found->second], key, first, second, memory);
     }
   pairs.clear();
   walls.clear();
@@ -185,11 +168,11 @@ void redistribute(const Comm& comm, const std::vector<std::int64_t>& ids, std::v
   for (const Message& message : comm.exchange_all(forwarded))
     for (Reader reader(message); reader;) {
       const std::int64_t key = reader.integer(), first = reader.integer(), second = reader.integer();
-      const Vec3 displacement = reader.vector();
+      const auto memory = reader.element<ContactMemory>();
       if (second < 0) {
-        walls.push_back({first, ContactHistory::wall_of(second), displacement});
+        walls.push_back({first, ContactHistory::wall_of(second), memory});
       } else if (key == first || !mine.contains(first)) {  // a pair of two owned particles comes twice
-        pairs.push_back({first, second, displacement});
+        pairs.push_back({first, second, memory});
       }
     }
 }

@@ -15,7 +15,7 @@ namespace bedflow {
 void migrate(const Decomposition& decomposition, const DemSetup& setup, ParticleStore& particles, ContactHistory& history);
 
 // Particles anywhere on any rank, to their owners by place. Collective. For a restart on another number of ranks.
-ParticleStore redistribute(const Decomposition& decomposition, const ParticleStore& particles);
+ParticleStore redistribute(const Decomposition& decomposition, const DemSetup& setup, ParticleStore particles);
 
 // Histories anywhere on any rank, to every rank that owns a particle of theirs (ids: of this rank's particles). Collective.
 void redistribute(const Comm& comm, const std::vector<std::int64_t>& ids, std::vector<PairHistory>& pairs,

@@ -1,21 +1,31 @@
 // What a rank keeps of its particles.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
+#include <numbers>
 #include <vector>
 
 #include "base/vec3.h"
 
 namespace bedflow {
 
-// What a contact needs of a particle: 64 bytes, one cache line, one vector register. The third component of the spin stands
-// apart.
-struct alignas(64) ParticleRow {
-  Vec3 position;                  // m
-  Vec3 velocity;                  // m/s
-  double spin_x = 0, spin_y = 0;  // ω, rad/s
+enum class Side { wall, open, periodic };  // what a face of the box is for particles
+
+// Spheres of one material and one size, or one range of sizes.
+struct ParticleType {
+  double radius = 0;         // m; the largest when sizes are distributed
+  double density = 0;        // kg/m³
+  bool distributed = false;  // each particle has a radius of its own, in ParticleStore::radius
+
+  double mass() const { return mass_of(radius); }
+  double mass_of(double r) const { return 4 * std::numbers::pi / 3 * density * r * r * r; }
 };
+// I of a solid sphere, kg m².
+inline double inertia_of(double mass, double radius) {
+  return 0.4 * mass * radius * radius;
+}
 
 // How the force of the gas follows a particle's velocity within a gas step, and what the gas has not lost yet.
 struct GasResponse {
@@ -26,16 +36,63 @@ struct GasResponse {
 
 enum class GasForce { none, frozen, relaxed };  // over the sub-steps of a gas step
 
-// Sorted in space; owned particles first, then ghosts (copies of what other ranks, or other periodic images, own). A ghost across
-// a periodic face stands where its owner has it. Between rebuilds of the pair list an owned particle may leave its block, or the
-// box across a periodic face, by up to half a skin.
+struct DemSetup {
+  std::vector<ParticleType> types;             // one at least
+  Vec3 gravity;                                // m/s²
+  double skin = 0;                             // extra reach of the pair list, m
+  double range = 0;                            // gap over which particles attract each other, m
+  bool rotation = false;                       // the tangential law makes the particles spin
+  bool history = false;                        // the tangential law has a memory
+  bool rolling_history = false;                // the rolling law has one
+  bool verlet = false;                         // velocity Verlet, else symplectic Euler
+  GasForce gas = GasForce::none;               // what of gas_force and gas_response is used
+  std::array<std::array<Side, 2>, 3> sides{};  // [direction][low, high]
+
+  bool distributed() const {
+    return std::any_of(types.begin(), types.end(), [](const ParticleType& type) { return type.distributed; });
+  }
+  double largest_radius() const {
+    double result = 0;
+    for (const ParticleType& type : types) result = std::max(result, type.radius);
+    return result;
+  }
+};
+
+// What a contact needs of a particle: 64 bytes, one cache line, one vector register. The third component of the spin stands
+// apart.
+struct alignas(64) ParticleRow {
+  Vec3 position;                  // m
+  Vec3 velocity;                  // m/s
+  double spin_x = 0, spin_y = 0;  // ω, rad/s
+};
+
+// What contacts do to a particle, laid out so that a scaled row adds to the velocity and spin of a ParticleRow.
+struct alignas(64) ForceRow {
+  double torque_z = 0;
+  double known = 0, unused = 0;       // known: 1 once set, of a force that is kept
+  Vec3 force;                         // N
+  double torque_x = 0, torque_y = 0;  // N m
+
+  Vec3 torque() const { return {torque_x, torque_y, torque_z}; }
+  void add(Vec3 f, Vec3 t) {
+    force += f;
+    torque_x += t.x, torque_y += t.y, torque_z += t.z;
+  }
+};
+
+// Sorted by type and in space; owned particles first, then ghosts (copies of what other ranks, or other periodic images, own). A
+// ghost across a periodic face stands where its owner has it. Between rebuilds of the pair list an owned particle may leave its
+// block, or the box across a periodic face, by up to half a skin.
 struct ParticleStore {
   std::size_t owned = 0;
-  std::vector<ParticleRow> rows;          //    owned + ghosts
-  std::vector<double> spin_z;             //    owned + ghosts, rad/s
-  std::vector<std::int64_t> id;           //    owned + ghosts
-  std::vector<Vec3> gas_force;            // N  owned; over the sub-steps of a gas step; empty without gas
+  std::vector<ParticleRow> rows;   //    owned + ghosts
+  std::vector<double> spin_z;      //    owned + ghosts, rad/s
+  std::vector<std::int64_t> id;    //    owned + ghosts
+  std::vector<std::uint8_t> type;  //    owned + ghosts, index into DemSetup::types; empty with one type
+  std::vector<double> radius;      // m  owned + ghosts; empty unless the sizes of a type are distributed
+  std::vector<Vec3> gas_force;     // N  owned; over the sub-steps of a gas step; empty without gas
   std::vector<GasResponse> gas_response;  // owned; empty unless the force is relaxed
+  std::vector<ForceRow> previous;  //    owned; contact forces of the last sub-step; empty without velocity Verlet
 
   Vec3& position(std::size_t i) { return rows[i].position; }
   Vec3& velocity(std::size_t i) { return rows[i].velocity; }
@@ -44,13 +101,26 @@ struct ParticleStore {
   Vec3 spin(std::size_t i) const { return {rows[i].spin_x, rows[i].spin_y, spin_z[i]}; }
   void set_spin(std::size_t i, Vec3 spin) { rows[i].spin_x = spin.x, rows[i].spin_y = spin.y, spin_z[i] = spin.z; }
 
-  // Appends an owned particle; there are no ghosts yet.
-  void add(std::int64_t identity, Vec3 place, Vec3 speed, Vec3 spin) {
-    rows.push_back({place, speed, spin.x, spin.y});
-    spin_z.push_back(spin.z);
+  // Appends an owned particle of the first type; there are no ghosts yet.
+  void add(std::int64_t identity, Vec3 place, Vec3 speed, Vec3 turn) {
+    rows.push_back({place, speed, turn.x, turn.y});
+    spin_z.push_back(turn.z);
     id.push_back(identity);
     owned = rows.size();
   }
+  // Calls f(array) for every array that such a setup keeps for owned particles.
+  template <class Apply>
+  void each_array(const DemSetup& setup, Apply f) {
+    f(rows);
+    f(spin_z);
+    f(id);
+    if (setup.types.size() > 1) f(type);
+    if (setup.distributed()) f(radius);
+    if (setup.gas != GasForce::none) f(gas_force);
+    if (setup.gas == GasForce::relaxed) f(gas_response);
+    if (setup.verlet) f(previous);
+  }
+
   // Of the owned particles, for output.
   std::vector<Vec3> positions() const {
     return owned_vectors([](const ParticleStore& s, std::size_t i) { return s.position(i); });
@@ -60,11 +130,6 @@ struct ParticleStore {
   }
   std::vector<Vec3> spins() const {
     return owned_vectors([](const ParticleStore& s, std::size_t i) { return s.spin(i); });
-  }
-  void resize(std::size_t size) {
-    rows.resize(size);
-    spin_z.resize(size);
-    id.resize(size);
   }
 
  private:
@@ -76,19 +141,14 @@ struct ParticleStore {
   }
 };
 
-enum class Side { wall, open, periodic };  // what a face of the box is for particles
-
-struct DemSetup {
-  double radius = 0;                           // m
-  double mass = 0;                             // kg
-  Vec3 gravity;                                // m/s²
-  double skin = 0;                             // extra reach of the pair list, m
-  bool rotation = false;                       // the tangential law makes the particles spin
-  bool history = false;                        // the tangential law has a memory
-  GasForce gas = GasForce::none;               // what of gas_force and gas_response is used
-  std::array<std::array<Side, 2>, 3> sides{};  // [direction][low, high]
-
-  double inertia() const { return 0.4 * mass * radius * radius; }
-};
+inline const ParticleType& type_of(const DemSetup& setup, const ParticleStore& particles, std::size_t i) {
+  return setup.types[particles.type.empty() ? 0 : particles.type[i]];
+}
+inline double radius_of(const DemSetup& setup, const ParticleStore& particles, std::size_t i) {
+  return particles.radius.empty() ? type_of(setup, particles, i).radius : particles.radius[i];
+}
+inline double mass_of(const DemSetup& setup, const ParticleStore& particles, std::size_t i) {
+  return type_of(setup, particles, i).mass_of(radius_of(setup, particles, i));
+}
 
 }  // namespace bedflow

@@ -32,7 +32,7 @@ class MovingBed {
   }
   const Dem& dem() const { return scene_.dem; }
   double count() const { return static_cast<double>(scene_.dem.particles().owned); }
-  double contacts_per_particle() const { return 2.0 * static_cast<double>(scene_.dem.contacts()) / count(); }
+  double contacts_per_particle() const { return 2.0 * static_cast<double>(scene_.dem.contact_count()) / count(); }
 
  private:
   bool shaken_;

@@ -85,7 +85,7 @@ json measured(const Comm& world, bool alone, int along_x, int along_z, int subst
   Numbers mine;
   mine.add("owned", static_cast<double>(particles.owned));
   mine.add("ghosts", static_cast<double>(particles.rows.size() - particles.owned));
-  mine.add("touching", static_cast<double>(scene.dem.contacts()));
+  mine.add("touching", static_cast<double>(scene.dem.contact_count()));
   mine.add("across", static_cast<double>(contacts_across(particles, bed_spheres().diameter)));
   mine.add("arrived", static_cast<double>(arrived));
   mine.add("messages", static_cast<double>(traffic.messages) / all_substeps);

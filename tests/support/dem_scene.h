@@ -18,21 +18,27 @@ struct Spheres {
   double skin = 0.3e-3;
   std::array<Side, 3> sides{Side::wall, Side::wall, Side::wall};
 
-  double mass() const { return std::numbers::pi / 6 * density * diameter * diameter * diameter; }
-  PairAndWall<LinearSpringDashpot> contact() const {
-    return {LinearSpringDashpot::from_restitution(stiffness, restitution, mass() / 2),
-            LinearSpringDashpot::from_restitution(stiffness, restitution, mass())};
+  ParticleType type() const { return {diameter / 2, density, false}; }
+  double mass() const { return type().mass(); }
+  LinearSpringDashpot contact() const { return LinearSpringDashpot::from_restitution(stiffness, restitution); }
+  double collision_time() const { return contact().collision_time(mass() / 2); }
+  template <class Law>
+  Law law() const {
+    if constexpr (std::is_same_v<Law, Coulomb>) return {friction};
+    if constexpr (std::is_same_v<Law, TangentialSpring>) return TangentialSpring::from_normal(friction, contact());
+    if constexpr (std::is_same_v<Law, Frictionless>) return {};
   }
-  double collision_time() const { return contact().pair.collision_time(mass() / 2); }
-  PairAndWall<Coulomb> coulomb() const { return {{friction}, {friction}}; }
-  PairAndWall<TangentialSpring> spring() const {
-    return {TangentialSpring::from_normal(friction, contact().pair), TangentialSpring::from_normal(friction, contact().wall)};
+  // The same between particles and on walls.
+  template <class Law>
+  static LawTable<Law> everywhere(const Law& law) {
+    return {{law}, {law}};
   }
   template <class Law>
-  PairAndWall<Law> law() const {
-    if constexpr (std::is_same_v<Law, Coulomb>) return coulomb();
-    if constexpr (std::is_same_v<Law, TangentialSpring>) return spring();
-    if constexpr (std::is_same_v<Law, Frictionless>) return {};
+  ContactLaws laws() const {
+    ContactLaws result;
+    result.contact = everywhere(contact());
+    result.tangential = everywhere(law<Law>());
+    return result;
   }
 };
 
@@ -48,11 +54,11 @@ class Scene {
         decomposition_(
             comm, cells, size,
             {spheres.sides[0] == Side::periodic, spheres.sides[1] == Side::periodic, spheres.sides[2] == Side::periodic}, tall),
-        dem(decomposition_, setup(spheres, gas), timer) {}
+        dem(decomposition_, setup(spheres, gas), spheres.template laws<Law>(), timer) {}
 
   void place(const std::vector<PlacedSphere>& spheres) { take(seed_placed(decomposition_, spheres)); }
   void seed(const RandomSeeds& seeds) { take(seed_random(decomposition_, spheres_.diameter / 2, seeds)); }
-  void advance(int substeps, double dt) { dem.template advance(substeps, dt, spheres_.contact(), spheres_.template law<Law>()); }
+  void advance(int substeps, double dt) { dem.advance(substeps, dt); }
   const Decomposition& decomposition() const { return decomposition_; }
 
   // All particles of all ranks by id, on every rank; places as the owners have them.
@@ -73,12 +79,9 @@ class Scene {
  private:
   static DemSetup setup(const Spheres& spheres, bool gas) {
     DemSetup result;
-    result.radius = spheres.diameter / 2;
-    result.mass = spheres.mass();
+    result.types = {spheres.type()};
     result.gravity = spheres.gravity;
     result.skin = spheres.skin;
-    result.rotation = Law::rotation;
-    result.history = Law::history;
     result.gas = gas ? GasForce::frozen : GasForce::none;
     for (int d = 0; d < 3; ++d) result.sides[d] = {spheres.sides[d], spheres.sides[d]};
     return result;

@@ -33,18 +33,20 @@ struct Drift {
 template <class Scheme>
 Drift drift(const Scheme& scheme, double rate, double dt, int steps, int substeps) {
   const Vec3 gas{0.5, 2, -1};
-  DemSetup setup{.radius = 1, .mass = 2.5, .gravity = {0, -9.81, 0}, .gas = GasForce::relaxed};
-  const double b = rate * setup.mass;
+  const ParticleType type{1, 2.5, false};
+  const DemSetup setup{.types = {type}, .gravity = {0, -9.81, 0}, .gas = GasForce::relaxed};
+  const double b = rate * type.mass();
   ParticleStore one;
   one.add(0, {}, {-0.3, 0.1, 0.2}, {});
   one.gas_force.resize(1);
   one.gas_response.resize(1);
-  std::vector<Vec3> force(1), torque, place(1);
+  std::vector<ForceRow> force(1);
+  const std::vector<Vec3> place(2);
   const double h = dt / substeps;
   for (int s = 0; s < steps; ++s) {
     one.gas_force[0] = b * gas;
     one.gas_response[0] = {b, scheme.felt_in_substep(rate * h), {}};
-    for (int n = 0; n < substeps; ++n) integrate<false, GasForce::relaxed>(setup, one, force, torque, place, 1e300, h);
+    for (int n = 0; n < substeps; ++n) integrate<GasForce::relaxed, false, false, false>(setup, type, 0, 1, one, force.data(), place.data(), 1e150, h);
   }
   return {one.velocity(0), one.gas_response[0].debt};
 }

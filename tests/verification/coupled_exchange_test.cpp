@@ -38,7 +38,7 @@ struct Cloud {
                   .gravity = gravity,
                   .scheme = scheme},
                  timer),
-        dem(decomposition, dem_setup(), timer) {
+        dem(decomposition, dem_setup(), {LawTable<LinearSpringDashpot>{{{1, 0}}, {{1, 0}}}, LawTable<Frictionless>{{{}}, {{}}}, {}, {}}, timer) {
     ParticleStore cloud;
     for (int p = 0; p < 400; ++p) {  // on a skewed lattice, 2.4 diameters apart at least
       const Vec3 place{0.003 + 0.0028 * (p % 6) + 1e-4 * (p % 7), 0.004 + 0.0028 * (p / 6 % 8), 0.001 + 0.0024 * (p / 48)};
@@ -55,7 +55,7 @@ struct Cloud {
     return setup;
   }
   DemSetup dem_setup() const {
-    DemSetup setup{.radius = diameter / 2, .mass = mass, .gravity = gravity, .skin = 0.4 * diameter};
+    DemSetup setup{.types = {{diameter / 2, density, false}}, .gravity = gravity, .skin = 0.4 * diameter};
     setup.gas = std::holds_alternative<Explicit>(scheme) ? GasForce::frozen : GasForce::relaxed;
     setup.sides[2] = {Side::periodic, Side::periodic};
     return setup;
@@ -73,14 +73,13 @@ struct Cloud {
     const ExchangeBalance balance = transfer.balance(gas, exchange, dem.particles());
     for (int d = 0; d < 3; ++d) EXPECT_NEAR(balance.lost_by_gas[d], balance.received_by_particles[d], 1e-13 * balance.scale[d]);
     lost += dt * balance.lost_by_gas;
-    const PairAndWall<LinearSpringDashpot> contact{{1, 0}, {1, 0}};
     for (int s = 0; s < substeps; ++s) {
       if (std::holds_alternative<SubStepped>(scheme)) {
         transfer.locate(dem.particles());
         find_drag();
         transfer.pull(gas, dem.particles());
       }
-      dem.advance(1, dt / substeps, contact, PairAndWall<Frictionless>{});
+      dem.advance(1, dt / substeps);
     }
     ASSERT_FALSE(dem.failure()) << dem.failure().message;
   }

@@ -44,19 +44,19 @@ double fall_by_transfer(const DragScene& gas, double density, double gravity, do
   const double volume = std::numbers::pi / 6 * cube(gas.diameter);
   Transfer transfer(decomposition, grid, halo, {.particle_volume = volume}, timer);
   DemSetup setup{
-      .radius = gas.diameter / 2, .mass = density * volume, .gravity = {0, -gravity, 0}, .skin = 0.1 * gas.diameter, .gas = GasForce::frozen};
+      .types = {{gas.diameter / 2, density, false}}, .gravity = {0, -gravity, 0}, .skin = 0.1 * gas.diameter, .gas = GasForce::frozen};
   setup.sides[0] = setup.sides[2] = {Side::periodic, Side::periodic};
-  Dem dem(decomposition, setup, timer);
+  Dem dem(decomposition, setup, {LawTable<LinearSpringDashpot>{{{1, 0}}, {{1, 0}}}, LawTable<Frictionless>{{{}}, {{}}}, {}, {}},
+          timer);
   ParticleStore one;
   one.add(0, {1.3, 79, 2.2}, {}, {});
   dem.set_particles(std::move(one));
-  const PairAndWall<LinearSpringDashpot> contact{{1, 0}, {1, 0}};
   for (int s = 0; s < steps; ++s) {
     transfer.deposit_volume(dem.particles(), state.fraction);
     transfer.find_drag(WenYu{}, gas, dem.particles(), state);
     transfer.deposit_drag(dem.particles(), {}, exchange);
     transfer.sample(state, dem.particles());
-    dem.advance(200, time / steps / 200, contact, PairAndWall<Frictionless>{});
+    dem.advance(200, time / steps / 200);
   }
   return -dem.particles().velocity(0).y;
 }

@@ -82,7 +82,7 @@ Found found(const Simulation& simulation, const Comm& comm) {
   for (std::size_t r = 0; r < rows.size(); r += 4)
     result.position[static_cast<std::size_t>(rows[r])] = {rows[r + 1], rows[r + 2], rows[r + 3]};
   result.kinetic = comm.sum(simulation.particles()->kinetic_energy());
-  result.contacts = static_cast<std::size_t>(comm.sum(simulation.particles()->contacts()));
+  result.contacts = static_cast<std::size_t>(comm.sum(simulation.particles()->contact_count()));
   const Simulation::GasPlot gas = simulation.gas_plot();
   for (const double value : gas.fraction) result.fraction += value;
   for (const double value : gas.pressure) result.pressure += value;

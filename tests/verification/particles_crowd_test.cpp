@@ -115,7 +115,7 @@ TEST(PairList, NoContactIsEverMissed) {
           expected += norm(apart) < spheres.diameter;
         }
       scene.advance(1, dt);
-      ASSERT_EQ(scene.decomposition().comm().sum(scene.dem.contacts()), expected) << "sub-step " << n;
+      ASSERT_EQ(scene.decomposition().comm().sum(scene.dem.contact_count()), expected) << "sub-step " << n;
       met += expected;
     }
     EXPECT_GT(met, 1000);
@@ -139,7 +139,7 @@ TEST(Dem, AFewParticlesInAHugeBoxNeedNoMoreCellsThanParticles) {
   Scene<Coulomb> scene(Comm::world(), {1, 1, 1}, spheres);
   scene.place({{{0.001, 0.001, 0.001}, {}, {}}, {{0.999, 0.999, 0.999}, {}, {}}, {{0.999, 0.999, 0.999 + 0.9e-6}, {}, {}}});
   scene.advance(1, 1e-12);
-  EXPECT_EQ(scene.decomposition().comm().sum(scene.dem.contacts()), 1);
+  EXPECT_EQ(scene.decomposition().comm().sum(scene.dem.contact_count()), 1);
 }
 
 // ---------------------------------------------------------------------------------------------------- failures

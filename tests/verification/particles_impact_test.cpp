@@ -19,8 +19,7 @@ double mean_restitution(bool on_wall, double restitution, int steps_per_time) {
   spheres.restitution = restitution;
   Scene<Frictionless> scene(Comm::self(), box, spheres);
   const double speed = 0.5, radius = spheres.diameter / 2;
-  const auto contact = on_wall ? spheres.contact().wall : spheres.contact().pair;
-  const double dt = contact.collision_time(spheres.mass() / (on_wall ? 1 : 2)) / steps_per_time;
+  const double dt = spheres.contact().collision_time(spheres.mass() / (on_wall ? 1 : 2)) / steps_per_time;
   double sum = 0;
   for (int phase = 0; phase < 200; ++phase) {
     const double gap = (0.3 + phase / 200.0) * speed * dt;
@@ -91,13 +90,13 @@ double drop_error(double steps_per_time, double after) {
   spheres.restitution = 0.8;
   spheres.gravity = {0, -gravity, 0};
   Scene<Frictionless> scene(Comm::self(), box, spheres);
-  const LinearSpringDashpot law = spheres.contact().wall;
+  const LinearSpringDashpot law = spheres.contact();
   const double time = law.collision_time(spheres.mass()), dt = time / steps_per_time;
   std::mt19937_64 random(1);
   double sum = 0;
   for (int drop = 0; drop < 60; ++drop) {
     const double h0 = 1.5e-3 + 4e-4 * 0x1p-64 * static_cast<double>(random());  // any phase of first contact
-    const DroppedBall exact{h0, spheres.diameter / 2, spheres.mass(), law.stiffness, law.damping};
+    const DroppedBall exact{h0, spheres.diameter / 2, spheres.mass(), law.stiffness, law.damping(spheres.mass())};
     const int steps = static_cast<int>(std::ceil((exact.impact() + after * time) / dt));
     scene.place({{{0.02, h0, 0.02}, {}, {}}});
     scene.advance(steps, dt);
@@ -121,11 +120,11 @@ std::array<double, 4> stacked_exact(std::array<double, 4> state, double lid, con
   const auto law = spheres.contact();
   const double m = spheres.mass(), d = spheres.diameter;
   const auto rate = [&](const std::array<double, 4>& s) {
-    const auto force = [](const LinearSpringDashpot& l, double overlap, double approach) {
-      return overlap > 0 ? l(overlap, approach) : 0;
+    const auto force = [&](double mass, double overlap, double approach) {
+      return overlap > 0 ? law(Touching<double>{overlap, approach, mass, 0}) : 0;
     };
-    const double floor = force(law.wall, d / 2 - s[0], -s[1]), between = force(law.pair, d - (s[2] - s[0]), s[1] - s[3]),
-                 top = force(law.wall, d / 2 - (lid - s[2]), s[3]);
+    const double floor = force(m, d / 2 - s[0], -s[1]), between = force(m / 2, d - (s[2] - s[0]), s[1] - s[3]),
+                 top = force(m, d / 2 - (lid - s[2]), s[3]);
     return std::array<double, 4>{s[1], (floor - between) / m - gravity, s[3], (between - top) / m - gravity};
   };
   const auto moved = [](std::array<double, 4> s, const std::array<double, 4>& k, double h) {
@@ -185,7 +184,7 @@ struct SlidingBall : Spheres {
     skin = 1e-3;
   }
   double roll_time() const { return 2 * u0 / (7 * friction * bedflow::gravity); }
-  double dt() const { return contact().wall.collision_time(mass()) / 50; }
+  double dt() const { return contact().collision_time(mass()) / 50; }
   PlacedSphere start(Vec3 place) const {
     place.y = diameter / 2 - mass() * bedflow::gravity / stiffness;
     return {place, {u0, 0, 0}, {}};
@@ -219,7 +218,7 @@ template <class Law>
 Oblique impact(double degrees, const Spheres& spheres) {
   Scene<Law> scene(Comm::self(), box, spheres);
   const double angle = degrees * std::numbers::pi / 180, vn = 0.02 * std::cos(angle), vt = 0.02 * std::sin(angle);
-  const double time = spheres.contact().wall.collision_time(spheres.mass());
+  const double time = spheres.contact().collision_time(spheres.mass());
   scene.place({{{0.02, spheres.diameter / 2 + 1e-9, 0.02}, {vt, -vn, 0}, {}}});
   scene.advance(300, time / 200);
   const Particle p = scene.gathered().at(0);

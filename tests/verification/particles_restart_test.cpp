@@ -133,7 +133,7 @@ TYPED_TEST(Restart, OtherRanksKeepAllParticlesAndContacts) {
        i += static_cast<std::size_t>(world.size()))
     mine.add(saved.particles.id[i], saved.particles.position(i), saved.particles.velocity(i), saved.particles.spin(i));
   Scene<TypeParam> spread(world, edges, loaded());
-  spread.dem.restore(redistribute(spread.decomposition(), mine), {}, share(saved.pairs), share(saved.walls));
+  spread.dem.restore(redistribute(spread.decomposition(), spread.dem.setup(), mine), {}, share(saved.pairs), share(saved.walls));
   const auto before = spread.gathered();
   EXPECT_EQ(before.size(), 240u);
   std::int64_t pairs = world.sum(static_cast<std::int64_t>(spread.dem.pair_histories().size()));
@@ -142,7 +142,7 @@ TYPED_TEST(Restart, OtherRanksKeepAllParticlesAndContacts) {
             static_cast<std::int64_t>(saved.walls.size()));
   alone.advance(more, sub_step());
   spread.advance(more, sub_step());
-  EXPECT_EQ(world.sum(spread.dem.contacts()), alone.dem.contacts());
+  EXPECT_EQ(world.sum(spread.dem.contact_count()), alone.dem.contact_count());
   EXPECT_LT(largest_difference(alone.gathered(), spread.gathered(), edges), 1e-9 * loaded().diameter);
 }
 
@@ -167,9 +167,9 @@ TEST(ContactHistory, APairThatSeparatesForgets) {
   scene.advance(3, sub_step());
   ASSERT_EQ(scene.dem.pair_histories().size(), 1u);
   EXPECT_EQ(scene.dem.pair_histories()[0].low, 0);
-  EXPECT_GT(scene.dem.pair_histories()[0].displacement.y, 0);  // as seen by the lower id
+  EXPECT_GT(scene.dem.pair_histories()[0].memory.displacement.y, 0);  // as seen by the lower id
   scene.advance(40, sub_step());
-  EXPECT_EQ(scene.dem.contacts(), 0);
+  EXPECT_EQ(scene.dem.contact_count(), 0);
   EXPECT_TRUE(scene.dem.pair_histories().empty());
 }
 
@@ -183,7 +183,10 @@ TEST(Redistribute, EveryParticleComesToItsOwnerWithItsRows) {
     mine.add(id, {x, y, 0.5}, {static_cast<double>(id), 0, 0}, {});
     mine.gas_force.push_back({0, static_cast<double>(id), 0});
   }
-  const ParticleStore here = redistribute(decomposition, mine);
+  DemSetup setup;
+  setup.types = {{1e-3, 1000, false}};
+  setup.gas = true;
+  const ParticleStore here = redistribute(decomposition, setup, mine);
   EXPECT_EQ(world.sum(static_cast<std::int64_t>(here.owned)), 300);
   for (std::size_t i = 0; i < here.owned; ++i) {
     EXPECT_EQ(decomposition.owner(here.position(i)), world.rank());
