@@ -185,7 +185,7 @@ TEST(Redistribute, EveryParticleComesToItsOwnerWithItsRows) {
   }
   DemSetup setup;
   setup.types = {{1e-3, 1000, false}};
-  setup.gas = true;
+  setup.gas = GasForce::frozen;
   const ParticleStore here = redistribute(decomposition, setup, mine);
   EXPECT_EQ(world.sum(static_cast<std::int64_t>(here.owned)), 300);
   for (std::size_t i = 0; i < here.owned; ++i) {
