@@ -139,7 +139,7 @@ StepLimit Simulation::step_limit() const {
     }
   }
   if (coupling_ && std::holds_alternative<Explicit>(scene.coupling->scheme) && plan_.longest_step > plan_.step) {
-    const double b = decomposition_.comm().max(coupling_->transfer.largest_drag()), most = scene.particles->mass / b;
+    const double b = decomposition_.comm().max(coupling_->transfer.largest_drag()), most = scene.particles->mass() / b;
     if (b > 0 && most < limit.longest) limit = {most, "the drag of the particles allows m/b = " + number(most) + " s"};
   }
   return limit;
