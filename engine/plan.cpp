@@ -22,6 +22,11 @@ constexpr double resting_substep_seconds = 0.065e-6;    // the same in a bed at 
 constexpr double history_factor = 1.35;
 constexpr double particle_step_seconds = 0.07e-6;  // to the grid and back
 constexpr double cell_step_seconds = 0.25e-6;      // two outer iterations of SIMPLE
+constexpr double projection_cell_seconds = 0.21e-6;
+
+// Below this many cells the many cheap iterations of incomplete Cholesky cost SIMPLE, which solves its pressure to a hundredth,
+// no more than the few of a multigrid (tests/performance/bench_gas.cpp); the projection goes to a millionth.
+constexpr std::int64_t smallest_multigrid = 20000;
 
 std::string number(double value) {
   char text[32];
@@ -143,6 +148,13 @@ void plan_space(Plan& plan) {
   if (scene.particles) plan_seeds(plan);
 }
 
+void plan_pressure(Plan& plan) {
+  if (!plan.scene.gas) return;
+  const bool small = plan.scene.gas->setup.method == GasMethod::simple && plan.cell_count < smallest_multigrid;
+  const auto faster = small ? Preconditioner::incomplete_cholesky : Preconditioner::multigrid;
+  plan.scene.gas->setup.preconditioner = plan.scene.gas->preconditioner.value_or(faster);
+}
+
 void plan_cost(Plan& plan) {
   const Scene& scene = plan.scene;
   const bool history = scene.particles && scene.particles->laws.history();
@@ -154,10 +166,12 @@ void plan_cost(Plan& plan) {
                       particles * (24.0 * (rotation ? 8 : 5) + 16 + 8 * (4 + (history ? 25 : 0)));
   plan.checkpoint_bytes = 100e3 + field * 5 + particles * (8 + 24.0 * (rotation ? 4 : 3) + (history ? 3 * 40 : 0));
   const auto steps = static_cast<double>(plan.steps);
+  const bool projection = scene.gas && scene.gas->setup.method == GasMethod::projection;
+  const double cell_seconds = projection ? projection_cell_seconds : cell_step_seconds;
   const double factor = particles * (history ? history_factor : 1);
   const double substep = factor * (scene.coupling ? fluidized_substep_seconds : resting_substep_seconds);
   plan.seconds =
-      steps * (cells * cell_step_seconds + (scene.coupling ? particles * particle_step_seconds : 0) + plan.substeps * substep);
+      steps * (cells * cell_seconds + (scene.coupling ? particles * particle_step_seconds : 0) + plan.substeps * substep);
   if (scene.particles && scene.particles->settling) {
     const double settled = std::min(1.2 * plan.fall_time, scene.particles->settling->duration);  // at rest soon after
     plan.seconds += settled / plan.substep * factor * resting_substep_seconds;
@@ -187,11 +201,17 @@ std::string kernel_text(const Scene& scene) {
 void plan_parts(Plan& plan) {
   const Scene& scene = plan.scene;
   const auto add = [&](const char* part, bool on, const std::string& why) { plan.items.push_back({part, on, why}); };
-  add("gas grid and SIMPLE", scene.gas.has_value(),
+  add(!scene.gas || scene.gas->setup.method == GasMethod::simple ? "gas grid and SIMPLE" : "gas grid and projection",
+      scene.gas.has_value(),
       scene.gas ? std::to_string(scene.cells[0]) + " x " + std::to_string(scene.cells[1]) + " x " +
                       std::to_string(scene.cells[2]) + " cells"
                 : "the case has no gas");
   if (scene.gas) {
+    const Preconditioner preconditioner = scene.gas->setup.preconditioner;
+    add("multigrid for the pressure", preconditioner == Preconditioner::multigrid,
+        std::string("gas.") + name(preconditioner) +
+            (scene.gas->preconditioner ? ": the case says so"
+                                       : ": the faster for " + std::to_string(plan.cell_count) + " cells"));
     const auto& scheme = scene.gas->setup.convection;
     const bool second = !std::holds_alternative<Upwind>(scheme);
     add("convection of second order", second,
@@ -272,6 +292,7 @@ Plan make_plan(const Scene& scene, int ranks) {
   plan_time(plan);
   plan_corners(plan);
   check_coupling(plan);
+  plan_pressure(plan);
   plan_cost(plan);
   check_memory(plan);
   plan_parts(plan);

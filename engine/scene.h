@@ -20,7 +20,8 @@ namespace bedflow {
 
 struct GasScene {
   GasSetup setup;
-  Vec3 initial_velocity;  // m/s
+  Vec3 initial_velocity;                         // m/s
+  std::optional<Preconditioner> preconditioner;  // as the case names it; the plan chooses else
 };
 
 // Of seeded particles before time 0.

@@ -91,11 +91,25 @@ Panel panel_of(const v1::Panel& from) {
   return panel;
 }
 
+std::optional<Preconditioner> preconditioner(const v1::Gas& from) {
+  switch (from.pressure_solver_case()) {
+    case v1::Gas::kMultigrid:
+      return Preconditioner::multigrid;
+    case v1::Gas::kIncompleteCholesky:
+      return Preconditioner::incomplete_cholesky;
+    case v1::Gas::kUnpreconditioned:
+      return Preconditioner::unpreconditioned;
+    default:
+      return std::nullopt;
+  }
+}
+
 GasScene gas_scene(const v1::Case& from) {
   const v1::Gas& gas = from.gas();
   const v1::Simple& simple = gas.simple();
   GasScene scene;
   scene.initial_velocity = vec(gas.initial_velocity());
+  scene.preconditioner = preconditioner(gas);
   scene.setup = {.density = gas.density(),
                  .viscosity = gas.viscosity(),
                  .gravity = vec(from.gravity()),
@@ -107,6 +121,11 @@ GasScene gas_scene(const v1::Case& from) {
                  .max_iterations = static_cast<int>(simple.max_iterations()),
                  .tolerance = simple.tolerance(),
                  .pressure_tolerance = simple.pressure_tolerance()};
+  if (gas.has_projection()) {
+    scene.setup.method = GasMethod::projection;
+    scene.setup.tolerance = gas.projection().momentum_tolerance();
+    scene.setup.pressure_tolerance = gas.projection().pressure_tolerance();
+  }
   const SixFaces faces = six_faces(from.domain().faces());
   for (int d = 0; d < 3; ++d)
     for (int side = 0; side < 2; ++side) scene.setup.faces[d][side] = boundary(*faces[d][side], from, d);

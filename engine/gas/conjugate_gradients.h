@@ -3,6 +3,7 @@
 // Where x is given nowhere it is free by a constant: the right side is made to sum to 0, and x to have no mean.
 #pragma once
 
+#include <array>
 #include <variant>
 
 #include "gas/incomplete_cholesky.h"
@@ -12,7 +13,12 @@
 
 namespace bedflow {
 
-enum class Preconditioner { multigrid, incomplete_cholesky, none };
+enum class Preconditioner { multigrid, incomplete_cholesky, unpreconditioned };
+
+constexpr const char* name(Preconditioner preconditioner) {  // as in the schema
+  constexpr std::array names{"multigrid", "incomplete_cholesky", "unpreconditioned"};
+  return names[static_cast<std::size_t>(preconditioner)];
+}
 
 class ConjugateGradients {
  public:

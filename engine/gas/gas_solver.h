@@ -38,7 +38,7 @@ struct GasSetup {
   int max_iterations = 500;
   double tolerance = 1e-3;           // of the normalised residuals, and what a projection's momentum solve leaves
   double pressure_tolerance = 1e-2;  // reduction in a linear solve of the pressure
-  Preconditioner preconditioner = Preconditioner::incomplete_cholesky;  // of those solves
+  Preconditioner preconditioner = Preconditioner::multigrid;  // of those solves
 };
 
 struct GasState {

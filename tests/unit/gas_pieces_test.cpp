@@ -140,7 +140,7 @@ TEST(PressureCorrection, LeavesNoCellOutOfBalance) {
                                         {walls(), {true, true, true}},
                                         {walls(), {false, true, false}}}) {
     for (const Preconditioner preconditioner :
-         {Preconditioner::multigrid, Preconditioner::incomplete_cholesky, Preconditioner::none}) {
+         {Preconditioner::multigrid, Preconditioner::incomplete_cholesky, Preconditioner::unpreconditioned}) {
       Problem problem({12, 10, 8}, periodic, faces, Comm::world(), preconditioner);
       const Field still(problem.block.grid);
       Field p(problem.block.grid);

@@ -44,6 +44,10 @@ TEST(Laws, OfTheSchemaAreThoseOfTheCode) {
   EXPECT_EQ(arms(v1::Coupling::descriptor(), "drag"), NamesOf<Drag>::get());
   EXPECT_EQ(arms(v1::Particles::descriptor(), "contact"), NamesOf<ContactLaw>::get());
   EXPECT_EQ(arms(v1::Particles::descriptor(), "tangential"), NamesOf<TangentialLaw>::get());
+  EXPECT_EQ(arms(v1::Gas::descriptor(), "solver"), (std::set<std::string>{"simple", "projection"}));
+  EXPECT_EQ(arms(v1::Gas::descriptor(), "pressure_solver"),
+            (std::set<std::string>{name(Preconditioner::multigrid), name(Preconditioner::incomplete_cholesky),
+                                   name(Preconditioner::unpreconditioned)}));
   EXPECT_EQ(arms(v1::Gas::descriptor(), "convection"), NamesOf<Convection>::get());
   EXPECT_EQ(arms(v1::Panel::descriptor(), "kind"), NamesOf<decltype(Panel::kind)>::get());
   EXPECT_EQ(with_none(arms(v1::Particles::descriptor(), "rolling")), NamesOf<RollingLaw>::get());

@@ -167,6 +167,25 @@ TEST(Displacement, AMovingCloudDrivesTheGasThatItDisplaces) {
   }
 }
 
+// ---------------------------------------------------------------------------------------- exchange
+
+// Whatever the solvers leave undone: what the gas lost the particles received.
+TEST(Exchange, ClosesToRoundOffByEitherSolver) {
+  const Comm self = Comm::self();
+  for (const char* solver : {"simple {}", "projection {}"}) {
+    PhaseTimer timer;
+    const std::string monitor = R"(monitors { name: "exchange" momentum_balance {} interval: 0 })";
+    const std::string text = with(small_bed("coulomb { friction: 0.3 }", monitor), "simple {}", solver);
+    Simulation bed(make_plan(scene_of(self, text), 1), self, timer);
+    bed.seed();
+    for (int n = 0; n < 40; ++n) {
+      bed.step();
+      EXPECT_LT(bed.observation().momentum_residual, 1e-12) << solver;  // sums over 600 particles
+    }
+    EXPECT_GT(bed.observation().momentum_residual, 0) << solver;  // it was measured
+  }
+}
+
 // ---------------------------------------------------------------------------------------- minimum fluidization
 
 // Inflow raised slowly through a settled bed: its pressure drop follows Ergun, then stays at the bed's weight over its area.

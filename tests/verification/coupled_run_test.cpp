@@ -61,6 +61,8 @@ TEST_P(Resume, IsTheUninterruptedRunBitForBit) {
 }
 INSTANTIATE_TEST_SUITE_P(EveryTangentialLaw, Resume,
                          testing::Values(small_bed(coulomb), small_bed(spring), small_bed(frictionless)));
+INSTANTIATE_TEST_SUITE_P(ByProjection, Resume,
+                         testing::Values(with(small_bed(spring), "simple {} upwind {}", "projection {} smart {}")));
 INSTANTIATE_TEST_SUITE_P(ExchangesThatOwe, Resume,
                          testing::Values(with(small_bed(frictionless), "explicit", "semi_implicit"),
                                          with(small_bed(frictionless), "hat {} explicit", "gaussian {} sub_stepped")));
@@ -109,15 +111,17 @@ std::string tight_bed() {
 
 TEST(Ranks, AgreeWithOneRank) {
   const Comm world = Comm::world(), self = Comm::self();
-  const std::string text = tight_bed();
-  PhaseTimer timer;
-  Simulation together(make_plan(scene_of(world, text), world.size()), world, timer);
-  Simulation alone(make_plan(scene_of(world, text), 1), self, timer);
-  for (Simulation* simulation : {&together, &alone}) {
-    simulation->seed();
-    run(*simulation, 20);
+  const std::string projection = "projection { momentum_tolerance: 1e-10 pressure_tolerance: 1e-10 }";
+  for (const std::string& text : {tight_bed(), with(small_bed(spring), "simple {}", projection)}) {
+    PhaseTimer timer;
+    Simulation together(make_plan(scene_of(world, text), world.size()), world, timer);
+    Simulation alone(make_plan(scene_of(world, text), 1), self, timer);
+    for (Simulation* simulation : {&together, &alone}) {
+      simulation->seed();
+      run(*simulation, 20);
+    }
+    expect_alike(found(together, world), found(alone, self));
   }
-  expect_alike(found(together, world), found(alone, self));
 }
 
 TEST(Ranks, ACheckpointGoesOnOnAnotherNumberOfRanks) {
