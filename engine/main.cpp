@@ -1,4 +1,6 @@
 // bedflow-engine: one job folder in; events, statistics and checkpoints out.
+#include <malloc.h>
+
 #include <CLI/CLI.hpp>
 #include <exception>
 #include <iostream>
@@ -59,6 +61,8 @@ int main(int argc, char** argv) {
     std::cerr << "bedflow-engine: a job folder is needed; see --help\n";
     return static_cast<int>(Reason::invalid_case);
   }
+
+  mallopt(M_MMAP_THRESHOLD, 1 << 20);  // arrays that particles have outgrown go back to the system
 
   const bedflow::MpiSession session(&argc, &argv);
   const Comm world = Comm::world();

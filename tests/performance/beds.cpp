@@ -78,12 +78,12 @@ Bed bed_of(const Sticking& scene) {
   return bed;
 }
 
-Bed rested(const Bed& bed, double restitution, int substeps) {
+Bed rested(const Bed& bed, double restitution, double time, double dt) {
   Spheres spheres = bed_spheres();
   spheres.restitution = restitution;
   Sticking scene(Comm::self(), bed.box, spheres);
   scene.place(bed.spheres);
-  scene.advance(substeps, bed_substep);
+  scene.advance(static_cast<int>(time / dt), dt);
   return bed_of(scene);
 }
 
@@ -94,10 +94,11 @@ Bed fallen() {
   Sticking falling(Comm::self(), box, dull);
   falling.seed({count, 1, {0, 0, 0}, {box.x, 0.33, box.z}, 0});
   falling.advance(30000, bed_substep);
-  return rested(bed_of(falling), bed_spheres().restitution, 5000);
+  return rested(bed_of(falling), bed_spheres().restitution, 0.05, bed_substep);
 }
 
-// Side by side; the layers at the walls that are no more close up (10 ms).
+// Side by side. What leant on the walls that are no more opens the contacts all through the bed; it settles again, in long
+// sub-steps (τ/8) since only the rest counts.
 Bed repeated(const Bed& one, int along_x, int along_z) {
   Bed bed{{along_x * box.x, box.y, along_z * box.z}, {}};
   for (int i = 0; i < along_x; ++i)
@@ -106,7 +107,7 @@ Bed repeated(const Bed& one, int along_x, int along_z) {
         sphere.position += {i * box.x, 0, k * box.z};
         bed.spheres.push_back(sphere);
       }
-  return rested(bed, 0.5, 1000);
+  return rested(bed, 0.3, 0.08, 2.5 * bed_substep);
 }
 
 }  // namespace
@@ -117,15 +118,15 @@ double Bed::height() const {
   return highest + bed_spheres().diameter / 2;
 }
 
-std::filesystem::path settled_bed_file(int along_x, int along_z) {
+std::filesystem::path settled_bed_path(int along_x, int along_z) {
   const std::string name = "bedflow_bench_bed_" + std::to_string(along_x) + "_" + std::to_string(along_z) + ".data";
-  const std::filesystem::path path = std::filesystem::temp_directory_path() / name;
-  if (!std::filesystem::exists(path)) write(path, along_x * along_z == 1 ? fallen() : repeated(settled_bed(), along_x, along_z));
-  return path;
+  return std::filesystem::temp_directory_path() / name;
 }
 
 Bed settled_bed(int along_x, int along_z) {
-  return read(settled_bed_file(along_x, along_z));
+  const std::filesystem::path path = settled_bed_path(along_x, along_z);
+  if (!std::filesystem::exists(path)) write(path, along_x * along_z == 1 ? fallen() : repeated(settled_bed(), along_x, along_z));
+  return read(path);
 }
 
 }  // namespace bedflow

@@ -38,6 +38,6 @@ struct Bed {
 
 // At rest under gravity, so many boxes side by side in x and in z with no wall between them. Made by the first who asks.
 Bed settled_bed(int along_x = 1, int along_z = 1);
-std::filesystem::path settled_bed_file(int along_x, int along_z);
+std::filesystem::path settled_bed_path(int along_x, int along_z);  // where it is kept
 
 }  // namespace bedflow

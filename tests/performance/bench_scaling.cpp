@@ -134,7 +134,7 @@ json answer(const Comm& comm, const std::vector<std::string>& words) {
   if (words.size() != 5) throw std::runtime_error("see the head of bench_scaling.cpp for its arguments");
   const bool alone = words[0] == "alone";
   const int along_x = std::stoi(words[2]), along_z = std::stoi(words[3]), substeps = std::stoi(words[4]);
-  if (comm.root()) settled_bed_file(along_x, along_z);
+  if (comm.root()) settled_bed(along_x, along_z);  // the others find it made
   comm.barrier();
   return words[1] == Coulomb::name ? measured<Coulomb>(comm, alone, along_x, along_z, substeps)
                                    : measured<TangentialSpring>(comm, alone, along_x, along_z, substeps);

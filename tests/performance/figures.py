@@ -45,9 +45,9 @@ TARGETS = {
 def dem(bin_folder):
     yield from sweep(bin_folder, "dem", "settled|agitated")
     yield from sweep(bin_folder, "dem", "(coulomb|spring)/million", repetitions=1)
+    yield from scaling.two_ranks(bin_folder)
     for law in ("frictionless", "coulomb", "spring"):
         yield from sweep(bin_folder, "dem", f"{law}/memory", repetitions=1)  # each in a process of its own
-    yield from scaling.two_ranks(bin_folder)
 
 
 def gas(bin_folder):

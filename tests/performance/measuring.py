@@ -80,6 +80,8 @@ def sweep(bin_folder, group, only=".", repetitions=3):
                              f"--benchmark_repetitions={repetitions}"], one_core()))
     runs = {}
     for entry in report["benchmarks"]:
+        if entry.get("error_occurred"):
+            sys.exit(f"figures.py: {entry['name']}: {entry['error_message']}")
         if entry.get("run_type") == "iteration":
             runs.setdefault(entry["run_name"].split("/iterations:")[0], []).append(entry)
     for name, entries in runs.items():
