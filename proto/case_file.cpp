@@ -68,6 +68,7 @@ std::vector<CaseFault> check_case(const v1::Case& value) {
   check_faces(value, faults);
   check_flow(value, faults);
   check_particles(value, faults);
+  check_contacts(value, faults);
   check_seeding(value, faults);
   check_monitors(value, faults);
   shorten(faults);

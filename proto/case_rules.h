@@ -16,6 +16,7 @@ void check_scene(const v1::Case& value, CaseFaults& faults);      // what must b
 void check_faces(const v1::Case& value, CaseFaults& faults);      // periodic directions, walls, patches, balance of flows
 void check_flow(const v1::Case& value, CaseFaults& faults);       // driven directions, panels
 void check_particles(const v1::Case& value, CaseFaults& faults);  // types and sizes, contacts' reach
+void check_contacts(const v1::Case& value, CaseFaults& faults);   // laws that go together, pairs of types
 void check_seeding(const v1::Case& value, CaseFaults& faults);    // where they are at time 0
 void check_monitors(const v1::Case& value, CaseFaults& faults);   // monitors and the references that belong to them
 

@@ -333,5 +333,68 @@ TEST(CaseRules, ReferencesBelongToAMonitor) {
   EXPECT_THAT(of_monitor([](v1::Monitor& m) { m.mutable_kinetic_energy(); }, reference("one")), IsEmpty());
 }
 
+// ---- contacts
+
+v1::Hertz hertz() {
+  v1::Hertz law;
+  law.set_youngs_modulus(1e7);
+  law.set_poisson_ratio(0.3);
+  law.set_restitution(0.9);
+  law.set_impact_speed(1);
+  return law;
+}
+
+TEST(CaseRules, ATangentialSpringGoesWithItsNormalLaw) {
+  EXPECT_THAT(after([](v1::Case& c) { c.mutable_particles()->mutable_mindlin()->set_friction(0.1); }),
+              ElementsAre(fault_at("particles.mindlin", "particles.hertz")));
+  EXPECT_THAT(after([](v1::Case& c) {
+                *c.mutable_particles()->mutable_hertz() = hertz();
+                c.mutable_particles()->mutable_mindlin()->set_friction(0.1);
+              }),
+              IsEmpty());
+  EXPECT_THAT(after([](v1::Case& c) {
+                *c.mutable_particles()->mutable_hertz() = hertz();
+                c.mutable_particles()->mutable_spring()->set_friction(0.1);
+              }),
+              ElementsAre(fault_at("particles.spring", "use mindlin")));
+}
+
+TEST(CaseRules, WhatDoesNotTurnDoesNotRoll) {
+  EXPECT_THAT(after([](v1::Case& c) {
+                c.mutable_particles()->mutable_frictionless();
+                c.mutable_particles()->mutable_constant_rolling()->set_friction(0.01);
+              }),
+              ElementsAre(fault_at("particles.constant_rolling", "particles.frictionless")));
+}
+
+TEST(CaseRules, PairsNameTypesAndReadableParameters) {
+  EXPECT_THAT(after([](v1::Case& c) {
+                v1::PairContact& pair = *c.mutable_particles()->add_pairs();
+                pair.set_first("glass");
+                pair.set_second("wall");
+                pair.set_hamaker(1e-19);
+              }),
+              ElementsAre(fault_at("particles.pairs[0].first", "no particles.types"),
+                          fault_at("particles.pairs[0].hamaker", "particles.van_der_waals")));
+}
+
+TEST(CaseRules, VelocityVerletGoesWithForcesFrozenOverTheStep) {
+  EXPECT_THAT(after([](v1::Case& c) {
+                c.mutable_particles()->mutable_velocity_verlet();
+                c.mutable_coupling()->mutable_semi_implicit();
+              }),
+              ElementsAre(fault_at("particles.velocity_verlet", "coupling.semi_implicit")));
+}
+
+TEST(CaseRules, AnAttractionEndsBeyondWhereItStopsGrowing) {
+  EXPECT_THAT(after([](v1::Case& c) {
+                v1::VanDerWaals& law = *c.mutable_particles()->mutable_van_der_waals();
+                law.set_hamaker(1e-19);
+                law.set_nearest(1e-8);
+                law.set_furthest(1e-9);
+              }),
+              ElementsAre(fault_at("particles.van_der_waals.furthest", "above nearest")));
+}
+
 }  // namespace
 }  // namespace bedflow
