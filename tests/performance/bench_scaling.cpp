@@ -31,7 +31,7 @@ std::int64_t contacts_across(const ParticleStore& particles, double diameter) {
   cells.sort(places, diameter);
   std::int64_t count = 0;
   for (std::size_t ghost = particles.owned; ghost < particles.rows.size(); ++ghost)
-    cells.around(particles.position(ghost), [&](std::uint32_t first, std::uint32_t last) {
+    cells.around(particles.position(ghost), diameter, [&](std::uint32_t first, std::uint32_t last) {
       for (std::uint32_t n = first; n < last; ++n) count += norm(places[cells.order()[n]] - particles.position(ghost)) < diameter;
     });
   return count;
