@@ -34,7 +34,7 @@ std::string number(double value) {
   return text;
 }
 
-// The largest superficial velocity that any inflow of the scene reaches, m/s.
+// The largest superficial velocity that any inflow or held flux of the scene reaches, m/s.
 double fastest_inflow(const GasScene& gas) {
   double fastest = 0;
   for (const auto& pair : gas.setup.faces)
@@ -43,6 +43,8 @@ double fastest_inflow(const GasScene& gas) {
         fastest = std::max({fastest, inflow->jet.velocity, inflow->jet.from});
         for (const Inflow::Patch& patch : inflow->patches) fastest = std::max({fastest, patch.jet.velocity, patch.jet.from});
       }
+  for (const Drive& drive : gas.setup.drive)
+    if (drive.mass_flux) fastest = std::max(fastest, std::abs(*drive.mass_flux) / gas.setup.density);
   return fastest;
 }
 

@@ -249,6 +249,7 @@ Observation Simulation::observation() {
   if (gas_) {
     now.grid = &gas_->grid;
     now.pressure = &gas_->state.pressure;
+    now.pressure_fall = gas_->state.fall.y;
     now.fraction = &gas_->state.fraction;
     const GasBalance balance = gas_->solver.balance();
     const double through = std::max({std::abs(balance.in), std::abs(balance.out), std::abs(balance.storage)});
@@ -271,7 +272,8 @@ Simulation::GasPlot Simulation::gas_plot() const {
   for (int k = 0; k < grid.cells[2]; ++k)
     for (int j = 0; j < grid.cells[1]; ++j)
       for (int i = 0; i < grid.cells[0]; ++i) {
-        plot.pressure.push_back(gas.pressure(i, j, k));
+        const Vec3 centre = grid.low + Vec3{(i + 0.5) * grid.spacing.x, (j + 0.5) * grid.spacing.y, (k + 0.5) * grid.spacing.z};
+        plot.pressure.push_back(gas.pressure(i, j, k) - dot(gas.fall, centre));
         plot.fraction.push_back(gas.fraction(i, j, k));
         Vec3& velocity = plot.velocity.emplace_back();
         for (int d = 0; d < 3; ++d) {

@@ -21,14 +21,16 @@ void sum_over_particles(const Law& law, const StatisticScene& scene, const Obser
   }
 }
 
-// Only the rows of cells that bear on the value are read.
+// Only the rows of cells that bear on the value are read. fall: of the quantity per length upward, beside that of the field.
 template <class Law>
-void sum_over_cells(const Law& law, const StatisticScene& scene, const Grid& grid, const Field& field, std::span<double> sums) {
+void sum_over_cells(const Law& law, const StatisticScene& scene, const Grid& grid, const Field& field, double fall,
+                    std::span<double> sums) {
   for (int j = 0; j < grid.cells[1]; ++j) {
     const double weight = law.weight(scene, grid.first[1] + j);
     if (weight == 0) continue;
+    const double beside = -fall * (grid.first[1] + j + 0.5) * grid.spacing.y;
     for (int k = 0; k < grid.cells[2]; ++k) {
-      for (int i = 0; i < grid.cells[0]; ++i) sums[law.slot(grid.first[0] + i)] += weight * field(i, j, k);
+      for (int i = 0; i < grid.cells[0]; ++i) sums[law.slot(grid.first[0] + i)] += weight * (field(i, j, k) + beside);
     }
   }
 }
@@ -103,7 +105,8 @@ void Monitors::gather(const Observation& now) {
           if constexpr (Law::subject == Subject::particles) {
             sum_over_particles(law, scene_, now, sums);
           } else if constexpr (Law::subject != Subject::step) {
-            sum_over_cells(law, scene_, *now.grid, *field_of(Law::subject, now), sums);
+            const double fall = Law::subject == Subject::pressure ? now.pressure_fall : 0;
+            sum_over_cells(law, scene_, *now.grid, *field_of(Law::subject, now), fall, sums);
           }
         },
         m.setup.statistic);

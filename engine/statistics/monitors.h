@@ -33,6 +33,7 @@ struct Observation {
   const Decomposition& decomposition;
   const Grid* grid = nullptr;
   const Field* pressure = nullptr;           // Pa
+  double pressure_fall = 0;                  // upward, beside that of `pressure` (a driven periodic flow's), Pa/m
   const Field* fraction = nullptr;           // ε
   const ParticleStore* particles = nullptr;  // of this rank
   double radius = 0, mass = 0;               // of a particle, m, kg

@@ -144,6 +144,14 @@ TEST(VelocityProfile, IsTheMeanOfTheParticlesInEachTopHatBin) {
 
 // Gas statistics -----------------------------------------------------------------------------------------------------
 
+TEST(PressureDrop, CountsTheFallThatDrivesAPeriodicFlow) {
+  Box box;
+  Observation now = box.observation();
+  const double without = value_of(PressureDrop{.low = 0.0831, .high = 0.6123}, now);
+  now.pressure_fall = 40;
+  EXPECT_NEAR(value_of(PressureDrop{.low = 0.0831, .high = 0.6123}, now), without + 40 * (0.6123 - 0.0831), 1e-11);
+}
+
 TEST(PressureDrop, OfALinearPressureIsItsSlopeTimesTheDistance) {
   Box box;
   box.set(box.pressure, [](double x, double y, double z) { return 7 - 100 * y + 3 * (x - 0.2) + 11 * (z - 0.1); });
