@@ -102,9 +102,15 @@ CaseRead read_any(const std::string& where) {
     return read_case(std::string(std::istreambuf_iterator<char>(std::cin), {}));
   }
   if (!std::filesystem::exists(where)) {
-    const auto ready = ready_cases();
-    if (std::any_of(ready.begin(), ready.end(), [&](const auto& one) { return one.name == where; })) {
-      return {ready_case(where, ""), {}};
+    const auto at = where.find('@');
+    const std::string name = where.substr(0, at), preset = at == where.npos ? "" : where.substr(at + 1);
+    const auto has = [](const auto& list, const std::string& wanted) {
+      return std::any_of(list.begin(), list.end(), [&](const auto& one) { return one.name == wanted; });
+    };
+    if (has(ready_cases(), name) && (at == where.npos || has(ready_presets(), preset))) {
+      auto value = ready_case(name, preset);
+      auto faults = check_case(value);
+      return {std::move(value), std::move(faults)};
     }
     throw Failure(Exit::usage, "there is no file \"" + where + "\" and no ready case of that name",
                   "the ready cases are " + ready_case_names() + "; write one with: bedflow init NAME > case.txtpb");

@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include "bedflow/v1/results.pb.h"
+#include "case_difference.h"
 #include "case_source.h"
 #include "cases/ready_cases.h"
 #include "child.h"
@@ -64,6 +65,7 @@ Exit init(const Program&, const InitOptions& options) {
 struct CaseOptions {
   std::string where;
   std::vector<std::string> set;
+  std::string diff;
   std::uint32_t ranks = 1;
   Format format = Format::table;
 };
@@ -105,7 +107,17 @@ class TemporaryFile {
   std::string path_;
 };
 
+Exit explain_difference(const CaseOptions& options) {
+  Table table({"parameter", options.diff, options.where});
+  const auto found = differences(load_case(options.diff, options.set), load_case(options.where, options.set));
+  for (const auto& one : found) table.add({one.path, one.first, one.second});
+  if (!found.empty() || options.format != Format::table) print_data(table.text(options.format));
+  if (found.empty()) say("the two cases are the same model");
+  return Exit::ok;
+}
+
 Exit explain(const Program&, const CaseOptions& options) {
+  if (!options.diff.empty()) return explain_difference(options);
   const auto value = load_case(options.where, options.set);
   const auto engine = beside_own_executable("bedflow-engine");
   const TemporaryFile file(case_text(value));
@@ -158,8 +170,12 @@ void add_case_verbs(CLI::App& app, Program& program) {
 
   const auto plan_options = std::make_shared<CaseOptions>();
   verb = app.add_subcommand("explain", "print what a case requires: what is on and why, steps, cells, memory, time");
-  verb->add_option("case", plan_options->where, "file, - for stdin, or a ready case")->required();
+  verb->add_option("case", plan_options->where, "file, - for stdin, or a ready case, with a preset as in mueller@bedflow")
+      ->required();
   verb->add_option("--set", plan_options->set, "change a parameter first")->type_name("PATH=VALUE");
+  verb->add_option("--diff", plan_options->diff,
+                   "instead: in what models another case differs, as in --diff mueller mueller@bedflow")
+      ->type_name("CASE");
   verb->add_option("--ranks", plan_options->ranks, "ranks to plan for")->check(CLI::Range(1, 100000))->capture_default_str();
   add_format(verb, plan_options->format);
   on_call(verb, program, plan_options, explain);

@@ -209,6 +209,15 @@ TEST_F(ClientWithEngine, ExplainPrintsThePlanForItsRanks) {
   EXPECT_EQ(result.out, "the plan\n");
 }
 
+TEST_F(ClientWithEngine, ExplainTellsInWhatTwoCasesDiffer) {
+  const auto result = run({"explain", "--diff", "mueller@mfix-dpvm-upwind", "mueller@mfix-dpvm-smart"});
+  EXPECT_EQ(result.exit_code, 0) << result.error;
+  EXPECT_THAT(result.out, AllOf(HasSubstr("gas.convection"), HasSubstr("upwind {}"), HasSubstr("smart {}")));
+  EXPECT_THAT(result.out, testing::Not(HasSubstr("coupling")));
+  EXPECT_THAT(run({"explain", "--diff", "mueller", "mueller"}).error, HasSubstr("the same model"));
+  EXPECT_EQ(run({"explain", "--diff", "mueller", "mueller@nothing"}).exit_code, static_cast<int>(Exit::usage));
+}
+
 TEST_F(ClientWithEngine, RenderOfAFolderTakesTheCheckpointBeforeACorruptOne) {
   write("snapshot", bed_snapshot().SerializeAsString());
   const auto folder = job_folder();
