@@ -71,12 +71,6 @@ TEST(CaseRules, ShortestStepIsNotAboveTheStep) {
   EXPECT_THAT(after([](v1::Case& c) { c.mutable_time()->set_step(1e-4), c.mutable_time()->set_shortest_step(1e-4); }), IsEmpty());
 }
 
-TEST(CaseRules, LongestStepIsNotBelowTheStep) {
-  EXPECT_THAT(after([](v1::Case& c) { c.mutable_time()->set_step(1e-4), c.mutable_time()->set_longest_step(5e-5); }),
-              ElementsAre(fault_at("time.longest_step", "time.step")));
-  EXPECT_THAT(after([](v1::Case& c) { c.mutable_time()->set_step(1e-4), c.mutable_time()->set_longest_step(1e-3); }), IsEmpty());
-}
-
 TEST(CaseRules, CellsMustHoldAParticleForTheHat) {
   // 0.120 m / 201 < 0.6 mm, half of the diameter; 200 cells are just allowed
   EXPECT_THAT(after([](v1::Case& c) { c.mutable_domain()->mutable_cells()->set_y(201); }),
