@@ -5,6 +5,7 @@
 
 #include <filesystem>
 #include <numbers>
+#include <string>
 #include <vector>
 
 #include "support/dem_scene.h"
@@ -32,12 +33,32 @@ inline constexpr double shaking_period = 1.0 / 15;  // s
 
 struct Bed {
   Vec3 box;
-  std::vector<PlacedSphere> spheres;
-  double height() const;  // top of the highest sphere, m
+  std::vector<PlacedSphere> spheres;  // with their kind and diameter
+  double height() const;              // top of the highest sphere, m
 };
 
 // At rest under gravity, so many boxes side by side in x and in z with no wall between them. Made by the first who asks.
 Bed settled_bed(int along_x = 1, int along_z = 1);
 std::filesystem::path settled_bed_path(int along_x, int along_z);  // where it is kept
+// As many spheres in the one box, every second of half the diameter (kind 1).
+Bed settled_bed_of_two_sizes();
+
+// frictionless, coulomb, spring or hertz_mindlin for every pair of so many kinds and on the walls. E* of Hertz's contact gives it
+// the overlap of the linear one at a load in the middle of the bed (0.02 N), with a Poisson ratio of 0.3.
+ContactLaws bed_laws(const std::string& name, std::size_t kinds, double restitution = bed_spheres().restitution);
+
+// The particles of a bed on this rank alone.
+class BedScene {
+ public:
+  BedScene(const Bed& bed, const ContactLaws& laws, bool gas);
+  Bed bed() const;  // as it stands; throws std::runtime_error when a particle is lost
+
+ private:
+  Decomposition decomposition_;
+  PhaseTimer timer_;
+
+ public:
+  Dem dem;
+};
 
 }  // namespace bedflow

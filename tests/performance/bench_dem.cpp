@@ -1,13 +1,15 @@
 // µs per particle and sub-step of the whole particle side: contacts, walls, integration, pair list; and bytes per particle.
 //
 // settled: at rest under its weight. agitated: the settled bed's first period of shaking, pressed together and then thrown up.
-// million: 42 beds side by side, settled. Each with its contacts per particle, and with what one core could do at best.
+// million: 42 beds side by side, settled. two_sizes: every second sphere of half the diameter, settled. Each with its contacts
+// per particle, and with what one core could do at best.
 #include <benchmark/benchmark.h>
 #include <malloc.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <fstream>
+#include <functional>
 #include <string>
 
 #include "beds.h"
@@ -18,49 +20,45 @@ namespace {
 
 constexpr int gas_step = 20;  // sub-steps
 
-template <class Law>
 class MovingBed {
  public:
-  MovingBed(const Bed& bed, bool shaken) : shaken_(shaken), scene_(Comm::self(), bed.box, bed_spheres(), {8, 8, 8}, shaken) {
-    scene_.place(bed.spheres);
-  }
+  MovingBed(const Bed& bed, const ContactLaws& laws, double dt, bool shaken)
+      : dt_(dt), shaken_(shaken), scene_(bed, laws, shaken) {}
   void advance() {
     std::vector<Vec3>& push = scene_.dem.particles().gas_force;
     if (shaken_) std::fill(push.begin(), push.end(), Vec3{0, bed_spheres().mass() * shaking(time_), 0});
-    scene_.advance(gas_step, bed_substep);
-    time_ += gas_step * bed_substep;
+    scene_.dem.advance(gas_step, dt_);
+    time_ += gas_step * dt_;
   }
   const Dem& dem() const { return scene_.dem; }
   double count() const { return static_cast<double>(scene_.dem.particles().owned); }
   double contacts_per_particle() const { return 2.0 * static_cast<double>(scene_.dem.contact_count()) / count(); }
 
  private:
+  double dt_;
   bool shaken_;
   double time_ = 0;
-  Scene<Law> scene_;
+  BedScene scene_;
 };
 
-// Least time of a particle and sub-step, µs. Two passes, contacts and motion, stream the row, the third component of ω, force
-// and torque of a particle to and fro, the second reads its place at the last rebuild; its pairs, and the ξ of its contacts, are
-// read once. Arithmetic as the equations of contact_sweep.h, the laws and integrate.h have it.
+// Least time of a particle and sub-step, µs. Two passes, contacts and motion, stream the row, the third component of ω and the
+// force of a particle to and fro, the second reads its place at the last rebuild; the pairs of the list are read once, the memory
+// of touching ones to and fro. Arithmetic as the equations of pair_sweep.h, the laws and integrate.h have it.
 struct Bound {
   double memory, arithmetic;
 };
-template <class Law>
-Bound bound(double particles, double pairs, double contacts) {
-  const double row = 64 + 8, forces = Law::rotation ? 48 : 24, history = Law::history ? 24 : 0;
-  const double bytes = 2 * (2 * row + 2 * forces) + 24 + pairs * (8 + 2 * history);
-  const double resident = row + forces + 24 + pairs * (8 + history);
-  const double flops = 8 * pairs + contacts * (32 + (Law::rotation ? 48 : 0) + (Law::history ? 60 : 0)) + 24;
-  const double roots = contacts * (2 + (Law::rotation ? 2 : 0) + (Law::history ? 3 : 0));
+Bound bound(double particles, double contacts, bool rotation, bool history) {
+  constexpr double pairs = 3.8, row = 64 + 8, force = 64, place = 24, pair = 8, memory = 32;
+  const double bytes = 2 * 2 * (row + force) + place + pairs * pair + (history ? contacts * 2 * memory : 0);
+  const double resident = row + force + place + pairs * (pair + (history ? memory : 0));
+  const double flops = 8 * pairs + contacts * (32 + (rotation ? 48 : 0) + (history ? 60 : 0)) + 24;
+  const double roots = contacts * (2 + (rotation ? 2 : 0) + (history ? 3 : 0));
   return {bytes / triad_bandwidth(static_cast<std::size_t>(particles * resident)) * 1e6,
           (flops / peak_flops() + roots / peak_roots()) * 1e6};
 }
 
-template <class Law>
-void sub_steps(benchmark::State& state, int along_x, int along_z, bool shaken) {
-  const Bed bed = settled_bed(along_x, along_z);
-  MovingBed<Law> moving(bed, shaken);
+void sub_steps(benchmark::State& state, const Bed& bed, const ContactLaws& laws, double dt, bool shaken) {
+  MovingBed moving(bed, laws, dt, shaken);
   for (int i = 0; i < (shaken ? 0 : 10); ++i) moving.advance();
   const std::int64_t before = moving.dem().rebuilds();
   double done = 0, contacts = 0;
@@ -71,7 +69,7 @@ void sub_steps(benchmark::State& state, int along_x, int along_z, bool shaken) {
   }
   if (moving.dem().failure()) state.SkipWithError(moving.dem().failure().message.c_str());
   contacts /= done;
-  const Bound least = bound<Law>(moving.count(), 3.8, contacts / 2);
+  const Bound least = bound(moving.count(), contacts / 2, laws.rotation(), laws.history());
   state.SetLabel("us per particle and sub-step");
   state.counters["figure"] =
       benchmark::Counter(done * gas_step * moving.count() * 1e-6, benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
@@ -91,8 +89,7 @@ double resident_bytes() {
 }
 
 // What 8 beds, with their lists and after a rebuild, add to the resident set of a process that has done nothing else.
-template <class Law>
-void memory(benchmark::State& state) {
+void memory(benchmark::State& state, const ContactLaws& laws) {
   for (auto _ : state) {
     if (!std::filesystem::exists(settled_bed_path(1, 8))) {
       settled_bed(1, 8);
@@ -100,26 +97,25 @@ void memory(benchmark::State& state) {
       return;
     }
     const double before = resident_bytes();
-    MovingBed<Law> moving(settled_bed(1, 8), true);
+    MovingBed moving(settled_bed(1, 8), laws, bed_substep, true);
     while (moving.dem().rebuilds() == 0) moving.advance();
     state.counters["figure"] = (resident_bytes() - before) / moving.count();
   }
   state.SetLabel("bytes per particle");
 }
 
-template <class Law>
-void add() {
-  const std::string law = Law::name;
-  const auto sweep = [&](const char* name, int iterations, int along_x, int along_z, bool shaken) {
-    benchmark::RegisterBenchmark((law + name).c_str(),
-                                 [=](benchmark::State& state) { sub_steps<Law>(state, along_x, along_z, shaken); })
-        ->Iterations(iterations)
-        ->Unit(benchmark::kMillisecond);
-  };
-  sweep("/settled", 50, 1, 1, false);
-  sweep("/agitated", static_cast<int>(shaking_period / (gas_step * bed_substep)), 1, 1, true);
-  sweep("/million", 5, 6, 7, false);
-  benchmark::RegisterBenchmark((law + "/memory").c_str(), memory<Law>)->Iterations(1);
+void add(const std::string& name, int iterations, const std::function<void(benchmark::State&)>& sweep) {
+  benchmark::RegisterBenchmark(name.c_str(), sweep)->Iterations(iterations)->Unit(benchmark::kMillisecond);
+}
+void add(const std::string& law) {
+  const ContactLaws laws = bed_laws(law, 1);
+  constexpr int period = static_cast<int>(shaking_period / (gas_step * bed_substep));
+  add(law + "/settled", 50, [=](benchmark::State& state) { sub_steps(state, settled_bed(), laws, bed_substep, false); });
+  add(law + "/agitated", period, [=](benchmark::State& state) { sub_steps(state, settled_bed(), laws, bed_substep, true); });
+  add(law + "/million", 5, [=](benchmark::State& state) { sub_steps(state, settled_bed(6, 7), laws, bed_substep, false); });
+  add(law + "/memory", 1, [=](benchmark::State& state) { memory(state, laws); });
+  add(law + "/two_sizes", 50,
+      [=](benchmark::State& state) { sub_steps(state, settled_bed_of_two_sizes(), bed_laws(law, 2), 0.5 * bed_substep, false); });
 }
 
 }  // namespace
@@ -129,8 +125,6 @@ int main(int argc, char** argv) {
   const bedflow::MpiSession session(&argc, &argv);
   mallopt(M_MMAP_THRESHOLD, 1 << 20);  // as bedflow-engine does
   benchmark::Initialize(&argc, argv);
-  bedflow::add<bedflow::Frictionless>();
-  bedflow::add<bedflow::Coulomb>();
-  bedflow::add<bedflow::TangentialSpring>();
+  for (const char* law : {"frictionless", "coulomb", "spring", "hertz_mindlin"}) bedflow::add(law);
   benchmark::RunSpecifiedBenchmarks();
 }

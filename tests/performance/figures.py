@@ -35,6 +35,11 @@ TARGETS = {
     "gas/projection/memory/iterations:1": ("<=", 400),
     "transfer/mueller": ("<=", 0.10),
     "transfer/goldschmidt": ("<=", 0.10),
+    "dem/hertz_mindlin/settled": ("<=", 0.075),
+    "dem/hertz_mindlin/agitated": ("<=", 0.075),
+    "dem/hertz_mindlin/million": ("<=", 0.1125),
+    "dem/hertz_mindlin/memory": ("<=", 700),
+    "dem/two_sizes": ("<=", 1.25),
     "dem/coulomb/two_ranks": (">=", 1.85),
     "peers/lammps/coulomb/settled": (">=", 3),
     "peers/lammps/coulomb/agitated": (">=", 3),
@@ -46,10 +51,13 @@ TARGETS = {
 
 
 def dem(bin_folder):
-    yield from sweep(bin_folder, "dem", "settled|agitated")
-    yield from sweep(bin_folder, "dem", "(coulomb|spring)/million", repetitions=1)
+    alone = list(sweep(bin_folder, "dem", "settled|agitated|two_sizes"))
+    yield from alone
+    value = {figure.name: figure.value for figure in alone}
+    yield Figure("dem/two_sizes", value["dem/coulomb/two_sizes"] / value["dem/coulomb/settled"], "times one size, coulomb")
+    yield from sweep(bin_folder, "dem", "(coulomb|spring|hertz_mindlin)/million", repetitions=1)
     yield from scaling.two_ranks(bin_folder)
-    for law in ("frictionless", "coulomb", "spring"):
+    for law in ("frictionless", "coulomb", "spring", "hertz_mindlin"):
         yield from sweep(bin_folder, "dem", f"{law}/memory", repetitions=1)  # each in a process of its own
 
 
