@@ -122,7 +122,8 @@ void plan_space(Plan& plan) {
   plan.cells = scene.cells;
   if (scene.gas) plan.ghosts = ghosts_of(scene.gas->setup.convection);
   if (scene.particles) {
-    plan.skin = scene.particles->skin > 0 ? scene.particles->skin : 0.2 * scene.particles->diameter();
+    plan.tuned_skin = scene.particles->skin == 0;
+    plan.skin = plan.tuned_skin ? 0.25 * scene.particles->diameter() : scene.particles->skin;
     if (scene.coupling) {
       const Vec3 spacing{scene.size.x / scene.cells[0], scene.size.y / scene.cells[1], scene.size.z / scene.cells[2]};
       plan.ghosts =
@@ -323,7 +324,7 @@ std::string Plan::text() const {
   if (scene.particles) {
     line("collision time tau", number(scene.particles->collision_time) + " s");
     line("sub-step dt_DEM", number(substep) + " s, " + std::to_string(substeps) + " a step");
-    line("skin of the pair list", number(skin) + " m");
+    line("skin of the pair list", number(skin) + (tuned_skin ? " m at the start, then tuned" : " m"));
   }
   line(scene.gas ? "gas step dt_CFD" : "step", number(step) + " s, not below " + number(shortest_step) + " s");
   if (corners.size() > 1) line("instants that steps end on", std::to_string(corners.size() - 1) + " before the end");

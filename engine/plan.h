@@ -24,7 +24,8 @@ struct Plan {
   double shortest_step = 0;     // s
   double substep = 0;           // dt_DEM, the longest, s; 0 without particles
   std::vector<double> corners;  // times that gas steps end on, in order; the last is the end, s
-  double skin = 0;              // m
+  double skin = 0;              // of the pair list, m
+  bool tuned_skin = false;      // that is the widest, and the run tunes it
   Int3 cells{};                 // of the decomposition: the gas grid's, or blocks wide enough for particles alone
   Int3 narrowest{1, 1, 1};      // fewest cells of a rank's block a direction
   int ghosts = 1;               // layers of the gas grid

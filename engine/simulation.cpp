@@ -23,6 +23,7 @@ DemSetup dem_setup(const Plan& plan) {
   setup.types = particles.types;
   setup.gravity = plan.scene.gravity;
   setup.skin = plan.skin;
+  setup.widest_skin = plan.tuned_skin ? plan.skin : 0;
   setup.verlet = particles.verlet;
   setup.sides = plan.scene.sides;
   if (plan.scene.coupling) {

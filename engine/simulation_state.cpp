@@ -96,6 +96,10 @@ CheckpointContent Simulation::checkpoint() const {
     for (int d = 0; d < 3; ++d) {
       content.numbers[std::string("particles/total_momentum_") + "xyz"[d]] = decomposition_.comm().sum(momentum[d]);
     }
+    const Dem::Tuning tuning = dem_->tuning();
+    content.numbers["particles/skin"] = tuning.skin;
+    content.numbers["particles/skin_substeps"] = static_cast<double>(tuning.counts.substeps);
+    content.numbers["particles/skin_rebuilds"] = static_cast<double>(tuning.counts.rebuilds);
     content.arrays.push_back(rows("particles/position", "m", "centres", store.positions()));
     content.arrays.push_back(rows("particles/velocity", "m/s", "velocities V", store.velocities()));
     if (dem_->setup().rotation) {
@@ -235,6 +239,11 @@ void Simulation::restore_particles(const CheckpointReader& from) {
       walls.push_back({wall_ids[2 * c], static_cast<int>(wall_ids[2 * c + 1]), {wall_displacements[c], wall_angles[c]}});
   }
   particle_count_ = decomposition_.comm().sum(static_cast<std::int64_t>(store.owned));
+  if (plan_.tuned_skin) {
+    dem_->set_tuning({from.number("particles/skin"),
+                      {static_cast<std::int64_t>(from.number("particles/skin_substeps")),
+                       static_cast<std::int64_t>(from.number("particles/skin_rebuilds"))}});
+  }
   dem_->restore(std::move(store), std::move(at_rebuild), pairs, walls);
 }
 

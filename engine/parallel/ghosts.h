@@ -18,6 +18,8 @@ class GhostExchange {
   // reach: how far from this block ghosts are wanted, m; no block may be narrower (collective; throws Stop(invalid_case)).
   GhostExchange(const Decomposition& decomposition, double reach);
 
+  // From the next choice on; not beyond the reach of the beginning.
+  void set_reach(double reach) { reach_ = reach; }
   // Chooses the ghosts anew by the places of the owned particles (m, as their owners have them) and appends the ghosts' places
   // and ids.
   void choose(std::vector<Vec3>& place, std::vector<std::int64_t>& id);

@@ -54,8 +54,11 @@ Dem::Dem(const Decomposition& decomposition, const DemSetup& setup, ContactLaws 
       laws_(std::move(laws)),
       timer_(timer),
       faces_(box_faces(decomposition.size())),
-      ghosts_(decomposition, reach()),
-      cells_(setup.types.size()) {}
+      ghosts_(decomposition, reach() - setup.skin + std::max(setup.skin, setup.widest_skin)),
+      cells_(setup.types.size()),
+      tuner_(2 * setup.largest_radius(), setup.widest_skin) {
+  ghosts_.set_reach(reach());
+}
 
 void Dem::use(ContactLaws laws) {
   CHECK(laws.history() <= setup_.history && laws.rolling_history() <= setup_.rolling_history && laws.range() <= setup_.range);
@@ -183,8 +186,24 @@ void Dem::forward_ghosts() {
   ghosts_.forward(std::span(columns).first(setup_.rotation ? 2 : 1));
 }
 
+void Dem::set_tuning(const Tuning& tuning) {
+  setup_.skin = tuning.skin;
+  tuner_.counts = tuning.counts;
+  ghosts_.set_reach(reach());
+}
+
+// By what all ranks have counted.
+void Dem::tune_skin() {
+  const Comm& comm = decomposition_.comm();
+  const auto particles = static_cast<double>(comm.sum(static_cast<std::int64_t>(particles_.owned)));
+  const auto pairs = static_cast<double>(comm.sum(static_cast<std::int64_t>(list_.count())));
+  if (particles > 0) set_tuning({tuner_.choose(setup_.skin, pairs / particles), {}});
+}
+
 void Dem::rebuild() {
   const PhaseTimer::Scope scope(timer_, Phase::pairs, particles_.owned);
+  ++tuner_.counts.rebuilds;
+  if (tuner_.due()) tune_skin();
   list_.save(particles_, now_, history_);
   drop_ghosts();
   {
@@ -228,6 +247,8 @@ void Dem::build_list() {
 void Dem::keep_list_valid(bool far, double dt) {
   enum : std::int64_t { valid, outdated, failed } status = far ? outdated : valid;
   if (far) look_for_lost(dt);
+  ++tuner_.counts.substeps;
+  if (tuner_.due()) status = outdated;
   if (failure_) status = failed;
   std::int64_t agreed = status;
   {

@@ -16,6 +16,7 @@
 #include "particles/history.h"
 #include "particles/laws.h"
 #include "particles/pair_list.h"
+#include "particles/skin_tuner.h"
 #include "particles/store.h"
 
 namespace bedflow {
@@ -44,6 +45,13 @@ class Dem {
   double max_overlap() const { return deepest_; }
   // Touching pairs in the last sub-step; a pair across ranks is counted by one of them.
   std::int64_t contact_count() const { return contacts_; }
+  // Where the tuning of the skin stands; a checkpoint holds it too.
+  struct Tuning {
+    double skin = 0;  // m
+    SkinTuner::Counts counts;
+  };
+  Tuning tuning() const { return {setup_.skin, tuner_.counts}; }
+  void set_tuning(const Tuning& tuning);               // before restore()
   std::int64_t rebuilds() const { return rebuilds_; }  // of the pair list since construction
   // PARTICLE_LOST (id, place), DIVERGED (not finite, or further than its diameter in one sub-step): noted on this rank, to be
   // voted on.
@@ -69,6 +77,7 @@ class Dem {
   void sort();
   void rebuild();
   void build_list();
+  void tune_skin();
   void keep_list_valid(bool far, double dt);
   void contacts(const Bodies& bodies);
   void walls(const Bodies& bodies);
@@ -87,6 +96,7 @@ class Dem {
   std::vector<ForceRow> force_;  // owned, 0 between sub-steps
   std::vector<Cells> cells_;     // of each type
   PairList list_;
+  SkinTuner tuner_;
   ContactHistory history_;  // only while the list is rebuilt
   double now_ = 0;          // number of the last sub-step
   double deepest_ = 0;

@@ -40,6 +40,7 @@ struct DemSetup {
   std::vector<ParticleType> types;             // one at least
   Vec3 gravity;                                // m/s²
   double skin = 0;                             // extra reach of the pair list, m
+  double widest_skin = 0;                      // to which it may be tuned, m; 0: it stays
   double range = 0;                            // gap over which particles attract each other, m
   bool rotation = false;                       // the tangential law makes the particles spin
   bool history = false;                        // the tangential law has a memory
@@ -85,14 +86,14 @@ struct alignas(64) ForceRow {
 // block, or the box across a periodic face, by up to half a skin.
 struct ParticleStore {
   std::size_t owned = 0;
-  std::vector<ParticleRow> rows;   //    owned + ghosts
-  std::vector<double> spin_z;      //    owned + ghosts, rad/s
-  std::vector<std::int64_t> id;    //    owned + ghosts
-  std::vector<std::uint8_t> type;  //    owned + ghosts, index into DemSetup::types; empty with one type
-  std::vector<double> radius;      // m  owned + ghosts; empty unless the sizes of a type are distributed
-  std::vector<Vec3> gas_force;     // N  owned; over the sub-steps of a gas step; empty without gas
+  std::vector<ParticleRow> rows;          //    owned + ghosts
+  std::vector<double> spin_z;             //    owned + ghosts, rad/s
+  std::vector<std::int64_t> id;           //    owned + ghosts
+  std::vector<std::uint8_t> type;         //    owned + ghosts, index into DemSetup::types; empty with one type
+  std::vector<double> radius;             // m  owned + ghosts; empty unless the sizes of a type are distributed
+  std::vector<Vec3> gas_force;            // N  owned; over the sub-steps of a gas step; empty without gas
   std::vector<GasResponse> gas_response;  // owned; empty unless the force is relaxed
-  std::vector<ForceRow> previous;  //    owned; contact forces of the last sub-step; empty without velocity Verlet
+  std::vector<ForceRow> previous;         //    owned; contact forces of the last sub-step; empty without velocity Verlet
 
   Vec3& position(std::size_t i) { return rows[i].position; }
   Vec3& velocity(std::size_t i) { return rows[i].velocity; }

@@ -6,6 +6,7 @@
 #include <random>
 
 #include "models/cohesion.h"
+#include "particles/skin_tuner.h"
 
 namespace bedflow {
 namespace {
@@ -223,6 +224,26 @@ TEST(PairSweep, AContactThatWasApartStartsWithoutMemory) {
   const std::vector<ForceRow> first = force;
   sweep(3);  // nothing touched in sub-step 2
   for (std::size_t i = 0; i < force.size(); ++i) EXPECT_EQ(force[i].force, first[i].force) << i;
+}
+
+// The cheapest of its model, found from either side, and where it was once it is there.
+TEST(SkinTuner, FindsTheCheapestSkinOfItsModel) {
+  const double diameter = 1e-3;
+  const auto settles_at = [&](double start, double substeps_at_tenth) {
+    SkinTuner tuner(diameter, 0.5 * diameter);
+    double skin = start;
+    for (int turn = 0; turn < 12; ++turn) {
+      const double x = skin / diameter, pairs = 3.8 * std::pow((1 + x) / 1.1, 3);
+      tuner.counts = {static_cast<std::int64_t>(8 * substeps_at_tenth * x / 0.1), 8};
+      EXPECT_TRUE(tuner.due());
+      skin = tuner.choose(skin, pairs);
+    }
+    return skin / diameter;
+  };
+  for (const double substeps : {20.0, 80.0, 2000.0}) EXPECT_NEAR(settles_at(5e-4, substeps), settles_at(3e-5, substeps), 0.03);
+  EXPECT_GT(settles_at(1e-4, 20), settles_at(1e-4, 80) + 0.05);  // the faster they fly, the wider
+  EXPECT_LT(settles_at(1e-4, 2000), 0.05);
+  EXPECT_FALSE(SkinTuner(diameter, 0).tunes());
 }
 
 TEST(Simd, TransposesAndItsInverseKeepEveryElement) {
