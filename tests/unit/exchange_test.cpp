@@ -26,6 +26,8 @@ TEST(Exchange, FeltShareIsTheMeanOfTheSlipOverTheStep) {
   EXPECT_NEAR(SemiImplicit::felt(1e9, 1), 1e-9, 1e-24);
 }
 
+const ParticleType type{1, 2.5, false};  // radius, density, one size
+
 // One particle in gas that streams by at a given velocity, under gravity; it does not act on the gas.
 struct Drift {
   Vec3 velocity, debt;
@@ -33,7 +35,6 @@ struct Drift {
 template <class Scheme>
 Drift drift(const Scheme& scheme, double rate, double dt, int steps, int substeps) {
   const Vec3 gas{0.5, 2, -1};
-  const ParticleType type{1, 2.5, false};
   const DemSetup setup{.types = {type}, .gravity = {0, -9.81, 0}, .gas = GasForce::relaxed};
   const double b = rate * type.mass();
   ParticleStore one;
@@ -46,7 +47,8 @@ Drift drift(const Scheme& scheme, double rate, double dt, int steps, int substep
   for (int s = 0; s < steps; ++s) {
     one.gas_force[0] = b * gas;
     one.gas_response[0] = {b, scheme.felt_in_substep(rate * h), {}};
-    for (int n = 0; n < substeps; ++n) integrate<GasForce::relaxed, false, false, false>(setup, type, 0, 1, one, force.data(), place.data(), 1e150, h);
+    for (int n = 0; n < substeps; ++n)
+      integrate<GasForce::relaxed, false, false, false>(setup, type, 0, 1, one, force.data(), place.data(), 1e150, h);
   }
   return {one.velocity(0), one.gas_response[0].debt};
 }
@@ -72,7 +74,7 @@ TEST(Exchange, SubSteppedFollowsItToFirstOrderAndLeavesItBeyondItsLimit) {
 
 // The gas is told ψ b (U − V) − (1 − ψ) m g before the particle moves; free of contacts it receives just that.
 TEST(Exchange, WhatAFreeParticleReceivesIsWhatTheGasWasTold) {
-  const double mass = 2.5, dt = 1;
+  const double mass = type.mass(), dt = 1;
   const Vec3 gravity{0, -9.81, 0}, slip = Vec3{0.5, 2, -1} - Vec3{-0.3, 0.1, 0.2};
   const auto told = [&](double felt, double rate) { return dt * mass * (felt * rate * slip - (1 - felt) * gravity); };
   for (const double rate : {1e-6, 0.1, 1.0, 10.0, 100.0}) {
