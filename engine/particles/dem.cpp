@@ -239,6 +239,7 @@ void Dem::build_list() {
   take_ghosts();
   list_.build(cells_, setup_, faces_, particles_, place_, ghosts_.shifts());
   list_.load(particles_, now_, history_);
+  history_ = {};  // as much as all the rest of a particle
   force_.assign(particles_.owned, {});
   place_.push_back({});
 }
