@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "coupling/transfer.h"
+#include "plan_walls.h"
 
 namespace bedflow {
 
@@ -229,6 +230,7 @@ void plan_parts(Plan& plan) {
     add("rotation", rotation, rotation ? "the tangential law turns the particles" : "without friction nothing turns them");
     add("contact history", history, history ? "the tangential spring remembers" : "the tangential law has no memory");
     add("radius per particle", false, "all have one size");
+    add("walls within the box", !scene.walls.empty(), scene.walls.empty() ? "the case has none" : walls_text(scene.walls));
     const bool settling = scene.particles->settling.has_value();
     add("settling before time 0", settling, settling ? "asked for by the seeding" : "not asked for");
   }
@@ -296,6 +298,7 @@ Plan make_plan(const Scene& scene, int ranks) {
   plan_corners(plan);
   check_coupling(plan);
   plan_pressure(plan);
+  if (scene.particles) check_walls(scene, plan.skin, plan.substep);
   plan_cost(plan);
   check_memory(plan);
   plan_parts(plan);

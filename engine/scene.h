@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "gas/gas_solver.h"
+#include "geometry/wall.h"
 #include "models/drag.h"
 #include "models/exchange.h"
 #include "models/kernel.h"
@@ -64,6 +65,7 @@ struct Scene {
   std::optional<GasScene> gas;
   std::optional<ParticleScene> particles;
   std::optional<CouplingScene> coupling;
+  std::vector<Wall> walls;              // within the box
   double end_time = 0;                  // s
   std::optional<double> step;           // dt_CFD at the start, s; τ if absent
   std::optional<double> longest_step;   // s; as step if absent

@@ -78,7 +78,8 @@ Simulation::Simulation(const Plan& plan, const Comm& comm, PhaseTimer& timer)
       decomposition_(comm, plan.cells, plan.scene.size, plan.scene.periodic, plan.tall, plan.narrowest),
       controller_(plan) {
   if (plan.scene.gas) gas_ = std::make_unique<GasPart>(decomposition_, plan_, timer_);
-  if (plan.scene.particles) dem_ = std::make_unique<Dem>(decomposition_, dem_setup(plan_), plan.scene.particles->laws, timer_);
+  if (plan.scene.particles)
+    dem_ = std::make_unique<Dem>(decomposition_, dem_setup(plan_), plan.scene.particles->laws, timer_, plan.scene.walls);
   if (plan.scene.coupling) coupling_ = std::make_unique<CouplingPart>(decomposition_, plan_, *gas_, timer_);
   audit_exchange_ =
       coupling_ && std::any_of(plan.scene.monitors.begin(), plan.scene.monitors.end(), [](const MonitorSetup& monitor) {
@@ -179,11 +180,12 @@ void Simulation::advance_particles(double dt) {
   if (coupling_ && std::visit([](const auto& scheme) { return scheme.anew; }, plan_.scene.coupling->scheme)) {
     for (int substep = 0; substep < substeps; ++substep) {
       pull_anew();
-      dem_->advance(1, dt / substeps);
+      dem_->advance(1, dt / substeps, time_ + substep * (dt / substeps));
     }
   } else {
-    dem_->advance(substeps, dt / substeps);
+    dem_->advance(substeps, dt / substeps, time_);
   }
+  wall_loads_ = dem_->take_wall_loads();
   substeps_ += static_cast<std::uint64_t>(substeps);
   max_overlap_ = dem_->take_max_overlap();
 }
@@ -234,6 +236,7 @@ bool Simulation::settle() {
   dem_->use(plan_.scene.particles->laws);
   settled_time_ += substeps * plan_.substep;
   dem_->take_max_overlap();
+  dem_->take_wall_loads();
   // Not before the highest has had the time to fall: at the start all are slow.
   const double energy = decomposition_.comm().sum(dem_->kinetic_energy());
   const double speed = std::sqrt(2 * energy / (static_cast<double>(particle_count_) * plan_.scene.particles->mass()));
@@ -262,6 +265,7 @@ Observation Simulation::observation() {
     now.radius = plan_.scene.particles->diameter() / 2;
     now.mass = plan_.scene.particles->mass();
     now.max_overlap = max_overlap_;
+    now.wall_loads = wall_loads_;
   }
   return now;
 }

@@ -99,7 +99,8 @@ class Simulation {
   double time_ = 0, last_step_ = 0, settled_time_ = 0;
   double hidden_solids_ = 0;  // m³ cut by the floor of ε in the last step
   double max_overlap_ = 0;
-  bool audit_exchange_ = false;  // a monitor asks for it
+  std::vector<WallLoad> wall_loads_;  // of the last step
+  bool audit_exchange_ = false;       // a monitor asks for it
   double exchange_residual_ = 0;
   std::int64_t particle_count_ = 0;
   GasOutcome gas_outcome_;

@@ -146,7 +146,9 @@ void Simulation::put_contacts(CheckpointContent& content) const {
       rows("contacts/pair_displacement", "m", "tangential displacement ξ as the lower id sees it", pair_displacements));
   content.arrays.push_back(rows("contacts/pair_angle", "rad", "rolling angle θ as the lower id sees it", pair_angles));
   content.arrays.push_back(
-      {"contacts/wall", "", "id of the particle, 2·direction + side of the wall", std::move(wall_ids), std::nullopt, 2});
+      {"contacts/wall", "",
+       "id of the particle; 2·direction + side of a face of the box, from 6 on walls and directions of contact",
+       std::move(wall_ids), std::nullopt, 2});
   content.arrays.push_back(
       rows("contacts/wall_displacement", "m", "tangential displacement ξ as the particle sees it", wall_displacements));
   content.arrays.push_back(rows("contacts/wall_angle", "rad", "rolling angle θ as the particle sees it", wall_angles));
@@ -236,7 +238,7 @@ void Simulation::restore_particles(const CheckpointReader& from) {
     for (std::size_t c = 0; c < pair_angles.size(); ++c)
       pairs.push_back({pair_ids[2 * c], pair_ids[2 * c + 1], {pair_displacements[c], pair_angles[c]}});
     for (std::size_t c = 0; c < wall_angles.size(); ++c)
-      walls.push_back({wall_ids[2 * c], static_cast<int>(wall_ids[2 * c + 1]), {wall_displacements[c], wall_angles[c]}});
+      walls.push_back({wall_ids[2 * c], wall_ids[2 * c + 1], {wall_displacements[c], wall_angles[c]}});
   }
   particle_count_ = decomposition_.comm().sum(static_cast<std::int64_t>(store.owned));
   if (plan_.tuned_skin) {

@@ -13,6 +13,7 @@
 #include "case_rules.h"
 #include "case_walker.h"
 #include "sphere_table.h"
+#include "mesh_file.h"
 
 namespace bedflow {
 namespace {
@@ -31,12 +32,16 @@ bool is_json(const std::string& text) {
   return first != std::string::npos && text[first] == '{';
 }
 
-// folder: where tables that the case names are looked for; null: nowhere.
+// folder: where files that the case names are looked for; null: nowhere.
 CaseRead read_case_text(const std::string& text, const std::filesystem::path* folder) {
   CaseParse parse = is_json(text) ? parse_case_json(text) : parse_case_text(text);
   CaseRead result{std::move(parse.value), std::move(parse.faults)};
   if (parse.read_to_end) {
-    if (folder != nullptr && !inline_sphere_tables(result.value, *folder, result.faults)) return result;
+    if (folder != nullptr) {
+      const bool spheres = inline_sphere_tables(result.value, *folder, result.faults);
+      const bool meshes = inline_mesh_files(result.value, *folder, result.faults);
+      if (!spheres || !meshes) return result;
+    }
     for (CaseFault& fault : check_case(result.value)) result.faults.push_back(std::move(fault));
   }
   shorten(result.faults);
@@ -70,6 +75,7 @@ std::vector<CaseFault> check_case(const v1::Case& value) {
   check_particles(value, faults);
   check_contacts(value, faults);
   check_seeding(value, faults);
+  check_walls(value, faults);
   check_monitors(value, faults);
   shorten(faults);
   return faults;

@@ -18,6 +18,8 @@ void check_flow(const v1::Case& value, CaseFaults& faults);       // driven dire
 void check_particles(const v1::Case& value, CaseFaults& faults);  // types and sizes, contacts' reach
 void check_contacts(const v1::Case& value, CaseFaults& faults);   // laws that go together, pairs of types
 void check_seeding(const v1::Case& value, CaseFaults& faults);    // where they are at time 0
+void check_particles(const v1::Case& value, CaseFaults& faults);  // where they are at time 0, contacts' reach
+void check_walls(const v1::Case& value, CaseFaults& faults);      // shapes, motions and meshes of walls within the box
 void check_monitors(const v1::Case& value, CaseFaults& faults);   // monitors and the references that belong to them
 
 constexpr std::array<const char*, 3> axis_names{"x", "y", "z"};
@@ -27,6 +29,9 @@ template <typename Components>
 auto component(const Components& value, std::size_t axis) {
   return axis == 0 ? value.x() : (axis == 1 ? value.y() : value.z());
 }
+
+// Whether this is the name of a face of the box: x_low …
+bool is_face(const std::string& name);
 
 // Reports where [low, high] along an axis is empty or reaches beyond the domain. `path` is that of the message with the
 // corners low and high.

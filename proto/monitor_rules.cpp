@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <map>
 
 #include "case_rules.h"
@@ -28,6 +29,8 @@ Needs needs_of(v1::Monitor::QuantityCase quantity) {
     case v1::Monitor::kParticleMass:
     case v1::Monitor::kMassEntered:
     case v1::Monitor::kMassLeft:
+    case v1::Monitor::kWallForce:
+    case v1::Monitor::kWallTorque:
       return {.gas = false, .particles = true};
     case v1::Monitor::QUANTITY_NOT_SET:
       break;
@@ -74,6 +77,16 @@ void check_velocity_profile(const v1::Case& value, const v1::VelocityProfile& pr
   }
 }
 
+bool is_wall(const v1::Case& value, const std::string& name) {
+  return std::any_of(value.walls().begin(), value.walls().end(), [&](const v1::Wall& wall) { return wall.name() == name; });
+}
+
+void check_wall_name(const v1::Case& value, const std::string& name, bool faces, const std::string& path, CaseFaults& faults) {
+  if (name.empty() || is_wall(value, name) || (faces && is_face(name))) return;
+  faults.push_back({path + ".wall", "is \"" + name + "\", but no wall of the case has that name" +
+                                        (is_face(name) ? ": of a face of the box there is wall_force only" : "")});
+}
+
 void check_quantity(const v1::Case& value, const v1::Monitor& monitor, const std::string& monitor_path, CaseFaults& faults) {
   const std::string path = child_path(monitor_path, quantity_name(monitor));
   const Needs needs = needs_of(monitor.quantity_case());
@@ -87,6 +100,8 @@ void check_quantity(const v1::Case& value, const v1::Monitor& monitor, const std
   check_type_name(value.particles(), monitor.particle_count().type(), path + ".type", faults);
   check_type_name(value.particles(), monitor.particle_mass().type(), path + ".type", faults);
   if (monitor.has_particle_velocity()) check_velocity_profile(value, monitor.particle_velocity(), path, faults);
+  if (monitor.has_wall_force()) check_wall_name(value, monitor.wall_force().wall(), true, path, faults);
+  if (monitor.has_wall_torque()) check_wall_name(value, monitor.wall_torque().wall(), false, path, faults);
   if (is_profile(monitor) && !monitor.has_averaging()) {
     faults.push_back({monitor_path + ".averaging", "is missing: a profile keeps averages only; set the length of a bin"});
   }

@@ -6,6 +6,7 @@
 
 #include "case/contact_scene.h"
 #include "case/seeding_scene.h"
+#include "case/wall_scene.h"
 #include "case_file.h"
 
 namespace bedflow {
@@ -146,12 +147,12 @@ ParticleScene particle_scene(const v1::Case& from) {
     types.push_back({kind.name, {kind.sizes.largest() / 2, kind.density, !kind.sizes.constant()}, kind.sizes.smallest() / 2});
     scene.types.push_back(types.back().type);
   }
-  scene.laws = contact_laws(particles, types);
+  scene.laws = contact_laws(from, types);
   if (const v1::Settling* settling = settling_of(particles)) {
-    scene.settling = Settling{settling->duration(), settling->rest_velocity(),
-                              contact_law_with(particles, types, settling->restitution())};
+    scene.settling =
+        Settling{settling->duration(), settling->rest_velocity(), contact_law_with(from, types, settling->restitution())};
   }
-  scene.collision_time = collision_time(particles, scene.laws.contact, types);
+  scene.collision_time = collision_time(from, scene.laws.contact, types);
   scene.steps_per_collision = particles.steps_per_collision();
   scene.skin = particles.skin();
   scene.verlet = particles.has_velocity_verlet();
@@ -211,7 +212,17 @@ CouplingScene coupling_scene(const v1::Coupling& from) {
   return scene;
 }
 
-Statistic statistic(const v1::Monitor& from, const v1::Particles& particles) {
+// Place among the faces of the box and then the walls.
+int wall_index(const v1::Case& from, const std::string& name) {
+  constexpr std::array faces{"x_low", "x_high", "y_low", "y_high", "z_low", "z_high"};
+  const auto face = std::find(faces.begin(), faces.end(), name);
+  if (face != faces.end()) return static_cast<int>(face - faces.begin());
+  const auto wall = std::find_if(from.walls().begin(), from.walls().end(), [&](const v1::Wall& w) { return w.name() == name; });
+  return static_cast<int>(faces.size() + static_cast<std::size_t>(wall - from.walls().begin()));
+}
+
+Statistic statistic(const v1::Case& scene, const v1::Monitor& from) {
+  const v1::Particles& particles = scene.particles();
   constexpr double everywhere = std::numeric_limits<double>::infinity();
   switch (from.quantity_case()) {
     case v1::Monitor::kBedHeight:
@@ -245,6 +256,10 @@ Statistic statistic(const v1::Monitor& from, const v1::Particles& particles) {
     }
     case v1::Monitor::kParticleMomentum:
       return ParticleMomentum{static_cast<int>(from.particle_momentum().axis())};
+    case v1::Monitor::kWallForce:
+      return WallForce{wall_index(scene, from.wall_force().wall()), static_cast<int>(from.wall_force().axis())};
+    case v1::Monitor::kWallTorque:
+      return WallTorque{wall_index(scene, from.wall_torque().wall()), static_cast<int>(from.wall_torque().axis())};
     default:
       return KineticEnergy{};
   }
@@ -271,6 +286,7 @@ Scene make_scene(const v1::Case& from) {
     for (int s = 0; s < 2; ++s) scene.sides[d][s] = scene.periodic[d] ? Side::periodic : side(*faces[d][s]);
   scene.gravity = vec(from.gravity());
   if (from.has_particles()) scene.particles = particle_scene(from);
+  scene.walls = wall_scene(from);
   if (from.has_coupling()) scene.coupling = coupling_scene(from.coupling());
   scene.end_time = from.time().end();
   if (from.time().has_step()) scene.step = from.time().step();
@@ -278,7 +294,7 @@ Scene make_scene(const v1::Case& from) {
   if (from.time().has_courant()) scene.courant = from.time().courant();
   if (from.time().has_shortest_step()) scene.shortest_step = from.time().shortest_step();
   for (const v1::Monitor& monitor : from.monitors()) {
-    MonitorSetup setup{monitor.name(), statistic(monitor, from.particles()), monitor.interval()};
+    MonitorSetup setup{monitor.name(), statistic(from, monitor), monitor.interval()};
     if (monitor.has_averaging()) {
       setup.averaging_start = monitor.averaging().start();
       setup.averaging_bin = monitor.averaging().bin();

@@ -70,46 +70,60 @@ Parameters parameters(const v1::Particles& from, const std::string& first, const
   return to;
 }
 
-// make(parameters) for each pair of types and each type on a wall.
+void refine(Parameters& to, const v1::Wall& wall) {
+  if (wall.has_restitution()) to.restitution = wall.restitution();
+  if (wall.has_friction()) to.friction = wall.friction();
+}
+
+// make(parameters) for each pair of types, each type on the faces of the box, and each wall and type.
 template <class Make>
-auto table(const v1::Particles& from, const std::vector<ContactType>& types, Make make) {
+auto table(const v1::Case& from, const std::vector<ContactType>& types, Make make) {
   LawTable<decltype(make(Parameters{}))> result;
   for (std::size_t b = 0; b < types.size(); ++b) {
-    for (std::size_t a = 0; a <= b; ++a) result.pairs.push_back(make(parameters(from, types[a].name, types[b].name)));
-    result.walls.push_back(make(parameters(from, types[b].name, "wall")));
+    for (std::size_t a = 0; a <= b; ++a) result.pairs.push_back(make(parameters(from.particles(), types[a].name, types[b].name)));
+    result.walls.push_back(make(parameters(from.particles(), types[b].name, "wall")));
   }
+  for (const v1::Wall& wall : from.walls())
+    for (const ContactType& type : types) {
+      Parameters own = parameters(from.particles(), type.name, "wall");
+      refine(own, wall);
+      result.walls.push_back(make(own));
+    }
   return result;
 }
 
-ContactLaw contact_law(const v1::Particles& from, const std::vector<ContactType>& types, std::optional<double> restitution) {
+ContactLaw contact_law(const v1::Case& scene, const std::vector<ContactType>& types, std::optional<double> restitution) {
+  const v1::Particles& from = scene.particles();
   if (from.has_hertz())
-    return table(from, types,
+    return table(scene, types,
                  [&](const Parameters& p) { return Hertz::from_restitution(p.modulus, restitution.value_or(p.restitution)); });
-  return table(from, types, [&](const Parameters& p) {
+  return table(scene, types, [&](const Parameters& p) {
     return LinearSpringDashpot::from_restitution(p.stiffness, restitution.value_or(p.restitution));
   });
 }
 
-TangentialLaw tangential_law(const v1::Particles& from, const std::vector<ContactType>& types) {
-  if (from.has_coulomb()) return table(from, types, [](const Parameters& p) { return Coulomb{p.friction}; });
+TangentialLaw tangential_law(const v1::Case& scene, const std::vector<ContactType>& types) {
+  const v1::Particles& from = scene.particles();
+  if (from.has_coulomb()) return table(scene, types, [](const Parameters& p) { return Coulomb{p.friction}; });
   if (from.has_spring())
-    return table(from, types, [&](const Parameters& p) {
+    return table(scene, types, [&](const Parameters& p) {
       return TangentialSpring::from_normal(p.friction, LinearSpringDashpot::from_restitution(p.stiffness, p.restitution),
                                            from.spring().stiffness_ratio(), from.spring().damping_ratio());
     });
   if (from.has_mindlin())
-    return table(from, types, [](const Parameters& p) {
+    return table(scene, types, [](const Parameters& p) {
       return Mindlin{p.friction, p.shear_modulus, damping_share(p.restitution)};
     });
-  return table(from, types, [](const Parameters&) { return Frictionless{}; });
+  return table(scene, types, [](const Parameters&) { return Frictionless{}; });
 }
 
 // The rolling spring scales with the linear law's k; with Hertz, with its slope at 1 % overlap of the first type's particles.
-RollingLaw rolling_law(const v1::Particles& from, const std::vector<ContactType>& types) {
+RollingLaw rolling_law(const v1::Case& scene, const std::vector<ContactType>& types) {
+  const v1::Particles& from = scene.particles();
   if (from.has_constant_rolling())
-    return table(from, types, [](const Parameters& p) { return ConstantRolling{p.rolling_friction}; });
+    return table(scene, types, [](const Parameters& p) { return ConstantRolling{p.rolling_friction}; });
   if (from.has_spring_rolling())
-    return table(from, types, [&](const Parameters& p) {
+    return table(scene, types, [&](const Parameters& p) {
       const double radius = types.front().type.radius;
       const double stiffness = from.has_hertz() ? 2 * p.modulus * radius * std::sqrt(0.01) : p.stiffness;
       return SpringRolling{p.rolling_friction, stiffness, from.spring_rolling().damping_share()};
@@ -117,27 +131,28 @@ RollingLaw rolling_law(const v1::Particles& from, const std::vector<ContactType>
   return LawTable<FreeRolling>{};
 }
 
-CohesionLaw cohesion_law(const v1::Particles& from, const std::vector<ContactType>& types) {
+CohesionLaw cohesion_law(const v1::Case& scene, const std::vector<ContactType>& types) {
+  const v1::Particles& from = scene.particles();
   if (!from.has_van_der_waals()) return LawTable<NoCohesion>{};
   const v1::VanDerWaals& law = from.van_der_waals();
   const double furthest = law.has_furthest() ? law.furthest() : 0.5 * types.front().type.radius;
-  return table(from, types, [&](const Parameters& p) { return VanDerWaals{p.hamaker, law.nearest(), furthest}; });
+  return table(scene, types, [&](const Parameters& p) { return VanDerWaals{p.hamaker, law.nearest(), furthest}; });
 }
 
 }  // namespace
 
-ContactLaws contact_laws(const v1::Particles& from, const std::vector<ContactType>& types) {
+ContactLaws contact_laws(const v1::Case& from, const std::vector<ContactType>& types) {
   return {contact_law(from, types, {}), tangential_law(from, types), rolling_law(from, types), cohesion_law(from, types)};
 }
 
-ContactLaw contact_law_with(const v1::Particles& from, const std::vector<ContactType>& types, double restitution) {
+ContactLaw contact_law_with(const v1::Case& from, const std::vector<ContactType>& types, double restitution) {
   return contact_law(from, types, restitution);
 }
 
-double collision_time(const v1::Particles& from, const ContactLaw& law, const std::vector<ContactType>& types) {
+double collision_time(const v1::Case& from, const ContactLaw& law, const std::vector<ContactType>& types) {
   const auto time = [&]<class Law>(const Law& of, double mass, double radius) {
     if constexpr (std::is_same_v<Law, Hertz>) {
-      return of.collision_time(mass, radius, from.hertz().impact_speed());
+      return of.collision_time(mass, radius, from.particles().hertz().impact_speed());
     } else {
       return of.collision_time(mass);
     }
@@ -147,7 +162,8 @@ double collision_time(const v1::Particles& from, const ContactLaw& law, const st
       [&](const auto& laws) {
         for (std::size_t b = 0; b < types.size(); ++b) {
           const double radius_b = types[b].smallest_radius, mass_b = types[b].type.mass_of(radius_b);
-          shortest = std::min(shortest, time(laws.walls[b], mass_b, radius_b));
+          for (std::size_t w = b; w < laws.walls.size(); w += types.size())
+            shortest = std::min(shortest, time(laws.walls[w], mass_b, radius_b));
           for (std::size_t a = 0; a <= b; ++a) {
             const double radius_a = types[a].smallest_radius, mass_a = types[a].type.mass_of(radius_a);
             shortest = std::min(shortest, time(laws.pairs[pair_index(a, b)], mass_a * mass_b / (mass_a + mass_b),

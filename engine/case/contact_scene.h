@@ -17,11 +17,11 @@ struct ContactType {
   double smallest_radius = 0;  // m
 };
 
-// The laws of the case for each pair of types and each type on a wall, pairs with parameters of their own included.
-ContactLaws contact_laws(const v1::Particles& from, const std::vector<ContactType>& types);
+// The laws of the case for each pair of types and each type on a wall, pairs and walls with parameters of their own included.
+ContactLaws contact_laws(const v1::Case& from, const std::vector<ContactType>& types);
 // The normal law of the case with another restitution, between particles and on walls.
-ContactLaw contact_law_with(const v1::Particles& from, const std::vector<ContactType>& types, double restitution);
+ContactLaw contact_law_with(const v1::Case& from, const std::vector<ContactType>& types, double restitution);
 // τ, s: the shortest over pairs and walls and the smallest particles.
-double collision_time(const v1::Particles& from, const ContactLaw& law, const std::vector<ContactType>& types);
+double collision_time(const v1::Case& from, const ContactLaw& law, const std::vector<ContactType>& types);
 
 }  // namespace bedflow

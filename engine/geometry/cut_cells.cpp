@@ -30,22 +30,6 @@ std::vector<Vec3> plane_in_cell(Vec3 point, Vec3 normal, Vec3 low, Vec3 high) {
   return polygon.size() >= 3 ? polygon : std::vector<Vec3>{};
 }
 
-struct Nearest {
-  Touches& touches;
-  Vec3 x;
-  double reach;
-
-  template <class Shape>
-  void operator()(const Shape& shape) const {
-    shape.touch(x, reach, touches);
-  }
-  void operator()(const Mesh& mesh) const {
-    std::vector<std::uint32_t> numbers;
-    mesh.near(x, reach, numbers);
-    mesh.touch(x, reach, numbers, touches);
-  }
-};
-
 }  // namespace
 
 std::vector<Facet> cut_cells(const Surface& surface, std::array<int, 3> cells, Vec3 edges) {
@@ -57,7 +41,7 @@ std::vector<Facet> cut_cells(const Surface& surface, std::array<int, 3> cells, V
       for (int i = 0; i < cells[0]; ++i) {
         const Vec3 low{i * edges.x, j * edges.y, k * edges.z}, high = low + edges;
         touches.clear();
-        std::visit(Nearest{touches, 0.5 * (low + high), half_diagonal}, surface);
+        std::visit([&](const auto& shape) { shape.touch(0.5 * (low + high), half_diagonal, touches); }, surface);
         if (touches.empty()) continue;
         const Touch nearest = touches.contacts()[0];
         const std::vector<Vec3> polygon = plane_in_cell(nearest.point, nearest.normal, low, high);

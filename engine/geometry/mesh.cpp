@@ -55,6 +55,12 @@ std::uint32_t Mesh::grow(std::uint32_t first, std::uint32_t count) {
   return here;
 }
 
+void Mesh::touch(Vec3 x, double reach, Touches& touches) const {
+  std::vector<std::uint32_t> numbers;
+  near(x, reach, numbers);
+  touch(x, reach, numbers, touches);
+}
+
 bool Mesh::near(Vec3 x, double reach, std::vector<std::uint32_t>& numbers) const {
   const std::size_t before = numbers.size();
   std::uint32_t open[deepest_tree];

@@ -23,6 +23,7 @@ class Mesh {
     for (const std::uint32_t number : numbers)
       if (const Touch touch = facets_[number].nearest(x); touch.distance < reach) touches.add(touch);
   }
+  void touch(Vec3 x, double reach, Touches& touches) const;  // of all facets; allocates
   // A sheet may be passed by its rim, and a particle within a closed body is near no facet: nobody is told to have passed.
   bool passed(Vec3 /*x*/) const { return false; }
   Bounds bounds() const { return {nodes_[0].low, nodes_[0].high}; }

@@ -56,15 +56,19 @@ double farthest(const Still&, double, double, const Bounds&) {
   return 0;
 }
 
-// A chord of the circle of the corner that is farthest from the axis.
-double farthest(const Rotation& rotation, double from, double to, const Bounds& bounds) {
+// Of the corner that is farthest from the axis.
+double radius_of(const Rotation& rotation, const Bounds& bounds) {
   double radius = 0;
   for (int corner = 0; corner < 8; ++corner) {
     Vec3 place;
     for (int d = 0; d < 3; ++d) place[d] = (corner >> d & 1) != 0 ? bounds.high[d] : bounds.low[d];
     radius = std::max(radius, norm(cross(rotation.axis, place - rotation.point)));
   }
-  return 2 * radius * std::abs(std::sin(0.5 * rotation.rate * (to - from)));
+  return radius;
+}
+
+double farthest(const Rotation& rotation, double from, double to, const Bounds& bounds) {  // a chord of its circle
+  return 2 * radius_of(rotation, bounds) * std::abs(std::sin(0.5 * rotation.rate * (to - from)));
 }
 
 template <class Shift>
@@ -72,10 +76,32 @@ double farthest(const Shift& motion, double from, double to, const Bounds&) {
   return norm(motion.pose(to).shift - motion.pose(from).shift);
 }
 
+double fastest(const Still&, const Bounds&) {
+  return 0;
+}
+double fastest(const Translation& motion, const Bounds&) {
+  return norm(motion.velocity);
+}
+double fastest(const Rotation& motion, const Bounds& bounds) {
+  return std::abs(motion.rate) * radius_of(motion, bounds);
+}
+double fastest(const Vibration& motion, const Bounds&) {
+  return 2 * std::numbers::pi * motion.frequency * norm(motion.amplitude);
+}
+double fastest(const Course& motion, const Bounds&) {
+  double speed = 0;
+  for (const Course::Knot& knot : motion.knots) speed = std::max(speed, norm(motion.pose(knot.time).velocity));
+  return speed;
+}
+
 }  // namespace
 
 double farthest_move(const Motion& motion, double from, double to, const Bounds& bounds) {
   return std::visit([&](const auto& kind) { return farthest(kind, from, to, bounds); }, motion);
+}
+
+double fastest_speed(const Motion& motion, const Bounds& bounds) {
+  return std::visit([&](const auto& kind) { return fastest(kind, bounds); }, motion);
 }
 
 }  // namespace bedflow

@@ -66,7 +66,9 @@ struct Course {
 
 using Motion = std::variant<Still, Translation, Rotation, Vibration, Course>;
 
-// How far no point of the wall that lies within `bounds` can have moved from one time to another, m.
+// No point of the wall that lies within `bounds` can have moved further from one time to another, m.
 double farthest_move(const Motion& motion, double from, double to, const Bounds& bounds);
+// No such point is ever faster, m/s.
+double fastest_speed(const Motion& motion, const Bounds& bounds);
 
 }  // namespace bedflow

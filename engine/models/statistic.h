@@ -38,9 +38,10 @@ struct StepValues {
 // What a statistic looks at. It has
 //   particles           add(scene, particle, sums)
 //   pressure, fraction  weight(scene, row) of a row of cells, and the slot(column) of the sums that a column goes to
+//   walls               wall, and add(force, torque, sums) of what the particles do to it
 //   step                value(step)
 // and, where it is more than one number from one sum, sums(scene), places(scene) and finish(scene, sums, values).
-enum class Subject { particles, pressure, fraction, step };
+enum class Subject { particles, pressure, fraction, walls, step };
 
 // E = Σ ½ m V² + ½ I ω²,   I = (2/5) m r²
 struct KineticEnergy {
@@ -171,6 +172,28 @@ struct VoidFractionProfile {
   }
 };
 
+// F_d = −Σ F_contact of the particles on the wall, the mean of the step.
+struct WallForce {
+  static constexpr const char* name = "wall_force";
+  static constexpr const char* unit = "N";
+  static constexpr const char* meaning = "force of the particles on the wall in one direction, the mean of the step";
+  static constexpr Subject subject = Subject::walls;
+  int wall = 0;  // of the faces of the box, 2·direction + side, and then of the walls
+  int axis = 1;
+  void add(Vec3 force, Vec3 /*torque*/, std::span<double> sums) const { sums[0] += force[axis]; }
+};
+// The same of the torque about the wall's axis of rotation, or the origin.
+struct WallTorque {
+  static constexpr const char* name = "wall_torque";
+  static constexpr const char* unit = "N·m";
+  static constexpr const char* meaning =
+      "torque of the particles on the wall about its axis of rotation, or the origin, one component, the mean of the step";
+  static constexpr Subject subject = Subject::walls;
+  int wall = 0;
+  int axis = 2;
+  void add(Vec3 /*force*/, Vec3 torque, std::span<double> sums) const { sums[0] += torque[axis]; }
+};
+
 // The statistics of a step are told by the step; there is nothing to sum.
 struct MassBalance {
   static constexpr const char* name = "mass_balance";
@@ -212,7 +235,8 @@ struct MaxOverlap {
 };
 
 using Statistic = std::variant<KineticEnergy, BedHeight, PressureDrop, MassBalance, MomentumBalance, MaxOverlap, ParticleCount,
-                               VoidFractionProfile, VelocityProfile, ParticleMomentum, ParticleMass, MassEntered, MassLeft>;
+                               VoidFractionProfile, VelocityProfile, ParticleMomentum, ParticleMass, MassEntered, MassLeft,
+                               WallForce, WallTorque>;
 
 // What a statistic leaves out when it is a series of one sum.
 template <class Law>

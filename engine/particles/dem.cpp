@@ -48,7 +48,7 @@ DemSetup required(DemSetup setup, const ContactLaws& laws) {
 
 }  // namespace
 
-Dem::Dem(const Decomposition& decomposition, const DemSetup& setup, ContactLaws laws, PhaseTimer& timer)
+Dem::Dem(const Decomposition& decomposition, const DemSetup& setup, ContactLaws laws, PhaseTimer& timer, std::vector<Wall> walls)
     : decomposition_(decomposition),
       setup_(required(setup, laws)),
       laws_(std::move(laws)),
@@ -56,7 +56,9 @@ Dem::Dem(const Decomposition& decomposition, const DemSetup& setup, ContactLaws 
       faces_(box_faces(decomposition.size())),
       ghosts_(decomposition, reach() - setup.skin + std::max(setup.skin, setup.widest_skin)),
       cells_(setup.types.size()),
-      tuner_(2 * setup.largest_radius(), setup.widest_skin) {
+      tuner_(2 * setup.largest_radius(), setup.widest_skin),
+      walls_(std::move(walls), decomposition.size(), reach() - setup.skin + std::max(setup.skin, setup.widest_skin)),
+      loads_(faces_.size() + walls_.size()) {
   ghosts_.set_reach(reach());
 }
 
@@ -128,6 +130,19 @@ std::vector<WallHistory> Dem::wall_histories() const {
   list_.each_wall_memory(now_, [&](std::size_t w, const ContactMemory& memory) {
     result.push_back({particles_.id[list_.near[w].particle], list_.near[w].face, memory});
   });
+  const std::vector<WallHistory> of_walls = walls_.histories(particles_, now_);
+  result.insert(result.end(), of_walls.begin(), of_walls.end());
+  return result;
+}
+
+std::vector<WallLoad> Dem::take_wall_loads() {
+  std::vector<WallLoad> result(loads_.size());
+  result.swap(loads_);
+  for (WallLoad& load : result) {
+    load.force *= 1.0 / std::max(loaded_, 1);
+    load.torque *= 1.0 / std::max(loaded_, 1);
+  }
+  loaded_ = 0;
   return result;
 }
 
@@ -205,6 +220,7 @@ void Dem::rebuild() {
   ++tuner_.counts.rebuilds;
   if (tuner_.due()) tune_skin();
   list_.save(particles_, now_, history_);
+  walls_.save(now_, history_);
   drop_ghosts();
   {
     const PhaseTimer::Scope migration(timer_, Phase::migration, particles_.owned);
@@ -239,6 +255,7 @@ void Dem::build_list() {
   take_ghosts();
   list_.build(cells_, setup_, faces_, particles_, place_, ghosts_.shifts());
   list_.load(particles_, now_, history_);
+  walls_.load(now_, history_, particles_.owned);
   history_ = {};  // as much as all the rest of a particle
   force_.assign(particles_.owned, {});
   place_.push_back({});
@@ -290,6 +307,10 @@ bool Dem::judge(std::size_t row, double dt) {
                                 : " (a larger domain.size would keep it, or outflow { screen: true } on that face)");
     return say(Reason::particle_lost, what.str());
   }
+  if (const std::string* wall = walls_.passed(x)) {
+    return say(Reason::particle_lost, "is on the wrong side of the wall " + *wall +
+                                          " (a stiffer contact or more particles.steps_per_collision would hold it)");
+  }
   const Vec3 moved = x - place_[row];
   if (norm(moved) > reach()) {
     std::ostringstream what;
@@ -301,13 +322,13 @@ bool Dem::judge(std::size_t row, double dt) {
 
 // ---------------------------------------------------------------------------------------------------- sub-steps
 
-void Dem::advance(int substeps, double dt) {
+void Dem::advance(int substeps, double dt, std::optional<double> time) {
   for (int substep = 0; substep < substeps && !stopped_; ++substep) {
     ++now_;
     const Bodies bodies{
         particles_.rows.data(), particles_.spin_z.data(), particles_.owned, force_.data(), ghosts_.shifts().data(), dt, now_};
     contacts(bodies);
-    walls(bodies);
+    walls(bodies, time ? std::optional(*time + substep * dt) : std::nullopt);
     keep_list_valid(move(dt), dt);
   }
 }
@@ -317,13 +338,18 @@ void Dem::contacts(const Bodies& bodies) {
   const SweepResult pairs = add_pair_forces(list_, setup_, particles_, bodies, laws_);
   deepest_ = std::max(deepest_, pairs.deepest);
   contacts_ = pairs.contacts;
-  add_rolling_torques(list_, faces_, setup_, particles_, bodies, laws_);
-  add_cohesion_forces(list_, faces_, setup_, particles_, bodies, laws_);
+  add_rolling_torques(list_, setup_, particles_, bodies, laws_);
+  add_cohesion_forces(list_, setup_, particles_, bodies, laws_);
 }
 
-void Dem::walls(const Bodies& bodies) {
+void Dem::walls(const Bodies& bodies, std::optional<double> time) {
   const PhaseTimer::Scope scope(timer_, Phase::walls, particles_.owned);
-  const WallResult result = add_wall_forces(list_, faces_, setup_, particles_, bodies, laws_);
+  WallResult result = add_face_forces(list_, faces_, setup_, particles_, bodies, laws_, loads_);
+  if (walls_.size() > 0) {
+    walls_.meet(setup_, particles_, std::span(place_).first(particles_.owned), time, now_);
+    result.note(add_wall_forces(walls_, setup_, particles_, bodies, laws_, loads_));
+  }
+  ++loaded_;
   deepest_ = std::max(deepest_, result.deepest);
   if (result.passed) look_for_lost(bodies.dt);
 }

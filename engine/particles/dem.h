@@ -18,6 +18,7 @@
 #include "particles/pair_list.h"
 #include "particles/skin_tuner.h"
 #include "particles/store.h"
+#include "particles/walls.h"
 
 namespace bedflow {
 
@@ -25,7 +26,8 @@ class Dem {
  public:
   // Collective. Throws Stop(invalid_case) when a block, or a periodic direction, is narrower than the reach of its particles.
   // What the laws require (rotation, memory, range) is added to the setup.
-  Dem(const Decomposition& decomposition, const DemSetup& setup, ContactLaws laws, PhaseTimer& timer);
+  Dem(const Decomposition& decomposition, const DemSetup& setup, ContactLaws laws, PhaseTimer& timer,
+      std::vector<Wall> walls = {});
 
   const DemSetup& setup() const { return setup_; }
   const ParticleStore& particles() const { return particles_; }
@@ -37,8 +39,8 @@ class Dem {
   // Other parameters of laws that require no more than the present ones, from the next sub-step on.
   void use(ContactLaws laws);
   // Sub-steps of dt (s): contacts, walls, motion; then pairs (rebuilt only when needed) or ghosts. Collective. After a failure on
-  // any rank no rank moves on.
-  void advance(int substeps, double dt);
+  // any rank no rank moves on. time: s, at the start, for walls that move; absent: they rest where they are at time 0.
+  void advance(int substeps, double dt, std::optional<double> time = {});
 
   // Largest overlap since the last take, over the sum of the two radii (on a wall the diameter), this rank.
   double take_max_overlap();
@@ -56,6 +58,9 @@ class Dem {
   // PARTICLE_LOST (id, place), DIVERGED (not finite, or further than its diameter in one sub-step): noted on this rank, to be
   // voted on.
   const Failure& failure() const { return failure_; }
+  // What the particles of this rank did to the faces of the box and to the walls, the mean over the sub-steps since the last
+  // take.
+  std::vector<WallLoad> take_wall_loads();
   double kinetic_energy() const;  // J, this rank, translation and rotation
 
   // What a checkpoint must hold beside the particles so that the same ranks go on with the same bits: the places at the
@@ -80,7 +85,7 @@ class Dem {
   void tune_skin();
   void keep_list_valid(bool far, double dt);
   void contacts(const Bodies& bodies);
-  void walls(const Bodies& bodies);
+  void walls(const Bodies& bodies, std::optional<double> time);
   bool move(double dt);
   void look_for_lost(double dt);
   bool judge(std::size_t row, double dt);
@@ -97,8 +102,11 @@ class Dem {
   std::vector<Cells> cells_;     // of each type
   PairList list_;
   SkinTuner tuner_;
-  ContactHistory history_;  // only while the list is rebuilt
-  double now_ = 0;          // number of the last sub-step
+  Walls walls_;
+  std::vector<WallLoad> loads_;  // of the six faces, then of the walls: summed over the sub-steps
+  int loaded_ = 0;               // sub-steps in them
+  ContactHistory history_;       // only while the list is rebuilt
+  double now_ = 0;               // number of the last sub-step
   double deepest_ = 0;
   std::int64_t contacts_ = 0, rebuilds_ = 0;
   Failure failure_;

@@ -17,29 +17,27 @@ void over_groups(const PairList& list, const DemSetup& setup, const ParticleStor
 
 }  // namespace
 
-void add_rolling_torques(PairList& list, const std::array<Plane, 6>& faces, const DemSetup& setup, const ParticleStore& particles,
-                         const Bodies& bodies, const ContactLaws& laws) {
+void add_rolling_torques(PairList& list, const DemSetup& setup, const ParticleStore& particles, const Bodies& bodies,
+                         const ContactLaws& laws) {
   const auto add = [&]<class Contact, class Rolling>(const LawTable<Contact>& contact, const LawTable<Rolling>& rolling) {
     if constexpr (!std::is_same_v<Rolling, FreeRolling>) {
       over_groups(
           list, setup, particles, [&]<bool with_ghost>(std::size_t first, std::size_t last, const auto& sizes, std::size_t pair) {
             sweep_rolling<native_lanes, with_ghost>(list, first, last, bodies, sizes, contact.pairs[pair], rolling.pairs[pair]);
           });
-      sweep_walls_rolling(list, faces, setup, particles, bodies, contact.walls, rolling.walls);
     }
   };
   std::visit(add, laws.contact, laws.rolling);
 }
 
-void add_cohesion_forces(PairList& list, const std::array<Plane, 6>& faces, const DemSetup& setup, const ParticleStore& particles,
-                         const Bodies& bodies, const ContactLaws& laws) {
+void add_cohesion_forces(PairList& list, const DemSetup& setup, const ParticleStore& particles, const Bodies& bodies,
+                         const ContactLaws& laws) {
   const auto add = [&]<class Cohesion>(const LawTable<Cohesion>& cohesion) {
     if constexpr (!std::is_same_v<Cohesion, NoCohesion>) {
       over_groups(list, setup, particles,
                   [&]<bool with_ghost>(std::size_t first, std::size_t last, const auto& sizes, std::size_t pair) {
                     sweep_cohesion<native_lanes, with_ghost>(list, first, last, bodies, sizes, cohesion.pairs[pair]);
                   });
-      sweep_walls_cohesion(list, faces, setup, particles, bodies, cohesion.walls);
     }
   };
   std::visit(add, laws.cohesion);

@@ -4,19 +4,25 @@
 #include "particles/laws.h"
 #include "particles/pair_sweep.h"
 #include "particles/wall_sweep.h"
+#include "particles/walls.h"
 
 namespace bedflow {
 
 // Add the forces and torques of the normal and tangential laws to bodies.force.
 SweepResult add_pair_forces(PairList& list, const DemSetup& setup, const ParticleStore& particles, const Bodies& bodies,
                             const ContactLaws& laws);
-WallResult add_wall_forces(PairList& list, const std::array<Plane, 6>& faces, const DemSetup& setup,
-                           const ParticleStore& particles, const Bodies& bodies, const ContactLaws& laws);
-// Add those of rolling resistance and of cohesion, between particles and on walls, where the scene has them.
-void add_rolling_torques(PairList& list, const std::array<Plane, 6>& faces, const DemSetup& setup, const ParticleStore& particles,
-                         const Bodies& bodies, const ContactLaws& laws);
-void add_cohesion_forces(PairList& list, const std::array<Plane, 6>& faces, const DemSetup& setup, const ParticleStore& particles,
-                         const Bodies& bodies, const ContactLaws& laws);
+// Add those of rolling resistance and of cohesion between particles, where the scene has them.
+void add_rolling_torques(PairList& list, const DemSetup& setup, const ParticleStore& particles, const Bodies& bodies,
+                         const ContactLaws& laws);
+void add_cohesion_forces(PairList& list, const DemSetup& setup, const ParticleStore& particles, const Bodies& bodies,
+                         const ContactLaws& laws);
+// Add those of all laws on the faces of the box and on the walls of the scene, and what these receive to the loads: of the six
+// faces, then of the walls.
+WallResult add_face_forces(PairList& list, const std::array<Plane, 6>& faces, const DemSetup& setup,
+                           const ParticleStore& particles, const Bodies& bodies, const ContactLaws& laws,
+                           std::vector<WallLoad>& loads);
+WallResult add_wall_forces(Walls& walls, const DemSetup& setup, const ParticleStore& particles, const Bodies& bodies,
+                           const ContactLaws& laws, std::vector<WallLoad>& loads);
 
 // Calls sweep(sizes) with what is known of the sizes of a group's pairs.
 template <class Sweep>

@@ -17,14 +17,15 @@ struct ContactMemory {
   ContactMemory operator-() const { return {-displacement, -angle}; }
 };
 
-// Memory of a touching contact, by the ids of its particles (low < high), or of a particle and the wall 2·direction + side.
+// Memory of a touching contact, by the ids of its particles (low < high), or of a particle and a wall: 2·direction + side of a
+// face of the box, or as Walls numbers its contacts.
 struct PairHistory {
   std::int64_t low, high;
   ContactMemory memory;  // as seen by `low`
 };
 struct WallHistory {
   std::int64_t id;
-  int wall;
+  std::int64_t wall;
   ContactMemory memory;  // as seen by the particle
 };
 
@@ -37,8 +38,8 @@ class ContactHistory {
     ContactMemory memory;  // as seen by the particle whose chain this is
     std::int32_t next;
   };
-  static constexpr std::int64_t wall_contact(int wall) { return -1 - wall; }
-  static constexpr int wall_of(std::int64_t other) { return static_cast<int>(-1 - other); }
+  static constexpr std::int64_t wall_contact(std::int64_t wall) { return -1 - wall; }
+  static constexpr std::int64_t wall_of(std::int64_t other) { return -1 - other; }
 
   void clear(std::size_t particles) {
     head_.assign(particles, none);

@@ -15,7 +15,7 @@ namespace bedflow {
 template <class Law>
 struct LawTable {
   std::vector<Law> pairs;  // by pair_index
-  std::vector<Law> walls;  // by type
+  std::vector<Law> walls;  // by type on the faces of the box, then by wall of the scene and type
 };
 // Place of the types a ≤ b in the upper triangle.
 constexpr std::size_t pair_index(std::size_t a, std::size_t b) {

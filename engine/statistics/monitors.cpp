@@ -41,6 +41,7 @@ const Field* field_of(Subject subject, const Observation& now) {
 }
 bool present(Subject subject, const Observation& now) {
   if (subject == Subject::particles) return now.particles != nullptr;
+  if (subject == Subject::walls) return !now.wall_loads.empty();
   return subject == Subject::step || (now.grid != nullptr && field_of(subject, now) != nullptr);
 }
 
@@ -104,6 +105,9 @@ void Monitors::gather(const Observation& now) {
           const std::span<double> sums = std::span(sums_).subspan(m.first_sum, sums_of(law, scene_));
           if constexpr (Law::subject == Subject::particles) {
             sum_over_particles(law, scene_, now, sums);
+          } else if constexpr (Law::subject == Subject::walls) {
+            const WallLoad& load = now.wall_loads[law.wall];
+            law.add(load.force, load.torque, sums);
           } else if constexpr (Law::subject != Subject::step) {
             const double fall = Law::subject == Subject::pressure ? now.pressure_fall : 0;
             sum_over_cells(law, scene_, *now.grid, *field_of(Law::subject, now), fall, sums);

@@ -37,6 +37,7 @@ struct Observation {
   const Field* fraction = nullptr;           // ε
   const ParticleStore* particles = nullptr;  // of this rank
   double radius = 0, mass = 0;               // of a particle, m, kg
+  std::vector<WallLoad> wall_loads{};        // in the step, the mean, this rank; of the faces of the box, then of the walls
   double max_overlap = 0;                    // in the step, over the diameter, this rank
   double mass_residual = 0;                  // in the step, the same on every rank
   double momentum_residual = 0;              // in the step, the same on every rank

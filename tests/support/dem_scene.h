@@ -17,6 +17,7 @@ struct Spheres {
   Vec3 gravity{};
   double skin = 0.3e-3;
   std::array<Side, 3> sides{Side::wall, Side::wall, Side::wall};
+  std::vector<Wall> walls{};
 
   ParticleType type() const { return {diameter / 2, density, false}; }
   double mass() const { return type().mass(); }
@@ -30,8 +31,8 @@ struct Spheres {
   }
   // The same between particles and on walls.
   template <class Law>
-  static LawTable<Law> everywhere(const Law& law) {
-    return {{law}, {law}};
+  LawTable<Law> everywhere(const Law& law) const {
+    return {{law}, std::vector<Law>(1 + walls.size(), law)};
   }
   template <class Law>
   ContactLaws laws() const {
@@ -54,11 +55,11 @@ class Scene {
         decomposition_(
             comm, cells, size,
             {spheres.sides[0] == Side::periodic, spheres.sides[1] == Side::periodic, spheres.sides[2] == Side::periodic}, tall),
-        dem(decomposition_, setup(spheres, gas), spheres.template laws<Law>(), timer) {}
+        dem(decomposition_, setup(spheres, gas), spheres.template laws<Law>(), timer, spheres.walls) {}
 
   void place(const std::vector<PlacedSphere>& spheres) { take(seed_placed(decomposition_, spheres)); }
   void seed(const RandomSeeds& seeds) { take(seed_random(decomposition_, spheres_.diameter / 2, seeds)); }
-  void advance(int substeps, double dt) { dem.advance(substeps, dt); }
+  void advance(int substeps, double dt, std::optional<double> time = {}) { dem.advance(substeps, dt, time); }
   const Decomposition& decomposition() const { return decomposition_; }
 
   // All particles of all ranks by id, on every rank; places as the owners have them.

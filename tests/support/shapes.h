@@ -40,20 +40,9 @@ class RandomVectors {
 
 inline std::vector<Touch> contacts(const Surface& surface, Vec3 x, double reach) {
   Touches touches;
-  double rise = smooth_rise;
-  if (const Mesh* mesh = std::get_if<Mesh>(&surface)) {
-    std::vector<std::uint32_t> near;
-    mesh->near(x, reach, near);
-    mesh->touch(x, reach, near, touches);
-    rise = mesh->rise();
-  } else {
-    std::visit(
-        [&](const auto& shape) {
-          if constexpr (!std::is_same_v<std::decay_t<decltype(shape)>, Mesh>) shape.touch(x, reach, touches);
-        },
-        surface);
-  }
-  const auto found = touches.contacts(rise);
+  std::visit([&](const auto& shape) { shape.touch(x, reach, touches); }, surface);
+  const Mesh* mesh = std::get_if<Mesh>(&surface);
+  const auto found = touches.contacts(mesh ? mesh->rise() : smooth_rise);
   return {found.begin(), found.end()};
 }
 

@@ -74,9 +74,19 @@ TEST(Motion, NoPointMovesFurtherThanTheBound) {
         farthest = std::max(farthest, norm(pose(motion, to).to_world(body) - pose(motion, from).to_world(body)));
       }
       EXPECT_LE(farthest, bound + 1e-14);
+      EXPECT_LE(bound, fastest_speed(motion, bounds) * std::abs(to - from) + 1e-14);
       tightest = std::min(tightest, bound - farthest);
     }
     EXPECT_LE(tightest, 1e-14) << "the bound is reached by a corner";
+  }
+}
+
+TEST(Motion, TheFastestSpeedIsReached) {
+  const Bounds bounds{{-0.5, 0, 0.2}, {1, 0.7, 0.9}};
+  for (const Motion& motion : motions()) {
+    double fastest = 0;
+    for (int n = 0; n < 3000; ++n) fastest = std::max(fastest, farthest_move(motion, 1e-3 * n, 1e-3 * n + 1e-7, bounds) / 1e-7);
+    EXPECT_NEAR(fastest, fastest_speed(motion, bounds), 2e-3 * fastest);  // of 67 phases of a vibration one is near the middle
   }
 }
 

@@ -1,12 +1,13 @@
-#include "geometry/stl.h"
+#include "stl.h"
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <map>
-#include <sstream>
-#include <tuple>
+
+#include "parameter_text.h"
 
 namespace bedflow {
 
@@ -15,9 +16,11 @@ namespace {
 constexpr std::size_t binary_header = 84, binary_triangle = 50;
 constexpr double thinnest = 1e-6;  // height over longest edge: below, the normal of single-precision corners is noise
 
-bool finite(const Triangle& triangle) {
-  return std::all_of(triangle.begin(), triangle.end(),
-                     [](Vec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); });
+bool finite(const StlTriangle& triangle) {
+  bool result = true;
+  for (const StlPoint& corner : triangle)
+    for (const double x : corner) result = result && std::isfinite(x);
+  return result;
 }
 
 StlRead refuse(const std::string& why) {
@@ -39,7 +42,7 @@ StlRead read_binary(std::string_view bytes) {
   for (std::size_t at = binary_header; at < bytes.size(); at += binary_triangle) {
     float row[12];  // normal, then three corners
     std::memcpy(row, bytes.data() + at, sizeof row);
-    Triangle triangle;
+    StlTriangle triangle;
     for (int k = 0; k < 3; ++k) triangle[k] = {row[3 + 3 * k], row[4 + 3 * k], row[5 + 3 * k]};
     if (!finite(triangle)) return not_finite(result.triangles.size() + 1);
     result.triangles.push_back(triangle);
@@ -77,14 +80,13 @@ StlRead read_text(std::string_view bytes) {
   StlRead result;
   Words words(bytes);
   const auto at_line = [&](const std::string& what) { return refuse("line " + std::to_string(words.line()) + ": " + what); };
-  Triangle triangle;
+  StlTriangle triangle{};
   int corners = 0;
   for (std::string_view word = words.next(); !word.empty(); word = words.next()) {
     if (word == "vertex") {
       if (corners == 3) return at_line("a facet with more than three corners");
-      Vec3& corner = triangle[corners++];
-      for (int d = 0; d < 3; ++d)
-        if (!words.next_number(corner[d])) return at_line("a vertex needs three numbers");
+      for (double& x : triangle[corners++])
+        if (!words.next_number(x)) return at_line("a vertex needs three numbers");
     } else if (word == "endfacet") {
       if (corners != 3) return at_line("a facet with " + std::to_string(corners) + " corners");
       corners = 0;
@@ -98,28 +100,22 @@ StlRead read_text(std::string_view bytes) {
   return result;
 }
 
-std::string text(Vec3 v) {
-  std::ostringstream out;
-  out << "(" << v.x << ", " << v.y << ", " << v.z << ")";
-  return out.str();
+std::string text(const StlPoint& p) {
+  return "(" + number_text(p[0]) + ", " + number_text(p[1]) + ", " + number_text(p[2]) + ")";
 }
-
-// Orders corners; −0 is 0.
-struct Before {
-  bool operator()(Vec3 a, Vec3 b) const { return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z); }
-};
 
 struct Edge {
   std::vector<std::size_t> along, against;  // triangles that run from its lower to its higher corner, and back
 };
 
-bool degenerate(const Triangle& t) {
-  double longest2 = 0;
-  for (int k = 0; k < 3; ++k) {
-    const Vec3 edge = t[(k + 1) % 3] - t[k];
-    longest2 = std::max(longest2, dot(edge, edge));
-  }
-  return norm(cross(t[1] - t[0], t[2] - t[0])) <= thinnest * longest2;
+bool degenerate(const StlTriangle& t) {
+  const auto way = [&](int from, int to) {
+    return StlPoint{t[to][0] - t[from][0], t[to][1] - t[from][1], t[to][2] - t[from][2]};
+  };
+  const auto length2 = [](const StlPoint& v) { return v[0] * v[0] + v[1] * v[1] + v[2] * v[2]; };
+  const StlPoint a = way(0, 1), b = way(0, 2);
+  const StlPoint area{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};  // twice
+  return std::sqrt(length2(area)) <= thinnest * std::max({length2(a), length2(b), length2(way(1, 2))});
 }
 
 std::string edge_fault(const Edge& edge, bool open_sheet) {
@@ -154,17 +150,17 @@ StlRead read_stl(std::string_view bytes) {
   return result;
 }
 
-std::vector<std::string> mesh_faults(const std::vector<Triangle>& triangles, bool open_sheet, std::size_t most) {
+std::vector<std::string> mesh_faults(const std::vector<StlTriangle>& triangles, bool open_sheet, std::size_t most) {
   std::vector<std::string> faults;
   std::size_t count = 0;
   const auto note = [&](const std::string& fault) {
     if (++count <= most) faults.push_back(fault);
   };
-  std::map<Vec3, std::size_t, Before> numbers;
-  std::vector<Vec3> corners;
+  std::map<StlPoint, std::size_t> numbers;  // −0 is 0
+  std::vector<StlPoint> corners;
   std::map<std::pair<std::size_t, std::size_t>, Edge> edges;
   for (std::size_t t = 0; t < triangles.size(); ++t) {
-    const Triangle& triangle = triangles[t];
+    const StlTriangle& triangle = triangles[t];
     if (degenerate(triangle)) {
       note("triangle " + std::to_string(t + 1) + ", " + text(triangle[0]) + " " + text(triangle[1]) + " " + text(triangle[2]) +
            ", has no area");

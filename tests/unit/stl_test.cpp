@@ -3,7 +3,7 @@
 
 #include <cstring>
 
-#include "geometry/stl.h"
+#include "stl.h"
 
 namespace bedflow {
 namespace {
@@ -12,30 +12,30 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-std::vector<Triangle> tetrahedron() {
-  const Vec3 o{0, 0, 0}, x{1, 0, 0}, y{0, 1, 0}, z{0, 0, 1};
+std::vector<StlTriangle> tetrahedron() {
+  const StlPoint o{0, 0, 0}, x{1, 0, 0}, y{0, 1, 0}, z{0, 0, 1};
   return {{o, y, x}, {o, x, z}, {o, z, y}, {x, y, z}};
 }
 
-std::string as_text(const std::vector<Triangle>& triangles) {
+std::string as_text(const std::vector<StlTriangle>& triangles) {
   std::string text = "solid a vertex of names\n";
-  for (const Triangle& t : triangles) {
+  for (const StlTriangle& t : triangles) {
     text += " facet normal 0 0 0\n  outer loop\n";
-    for (const Vec3 v : t)
-      text += "   vertex " + std::to_string(v.x) + " " + std::to_string(v.y) + " +" + std::to_string(v.z) + "\r\n";
+    for (const StlPoint& v : t)
+      text += "   vertex " + std::to_string(v[0]) + " " + std::to_string(v[1]) + " +" + std::to_string(v[2]) + "\r\n";
     text += "  endloop\n endfacet\n";
   }
   return text + "endsolid a vertex of names\n";
 }
 
-std::string as_binary(const std::vector<Triangle>& triangles) {
+std::string as_binary(const std::vector<StlTriangle>& triangles) {
   std::string bytes = "solid, as some programs begin a binary file";
   bytes.resize(80, ' ');
   const auto append = [&](const auto& value) { bytes.append(reinterpret_cast<const char*>(&value), sizeof value); };
   append(static_cast<std::uint32_t>(triangles.size()));
-  for (const Triangle& t : triangles) {
+  for (const StlTriangle& t : triangles) {
     for (int n = 0; n < 3; ++n) append(0.0F);
-    for (const Vec3 v : t)
+    for (const StlPoint& v : t)
       for (int d = 0; d < 3; ++d) append(static_cast<float>(v[d]));
     append(static_cast<std::uint16_t>(0));
   }
@@ -86,7 +86,7 @@ TEST(Stl, AHoleIsNamedByItsEdges) {
 
 TEST(Stl, MoreThanTwoTrianglesAtAnEdge) {
   auto fin = tetrahedron();
-  fin.push_back({Vec3{0, 0, 0}, Vec3{1, 0, 0}, Vec3{0.5, -1, 0}});
+  fin.push_back({StlPoint{0, 0, 0}, StlPoint{1, 0, 0}, StlPoint{0.5, -1, 0}});
   EXPECT_THAT(
       mesh_faults(fin, true),
       ElementsAre("edge (0, 0, 0) – (1, 0, 0) belongs to triangles 2, 5, 1: more than two meet there (a wall of its own for "
@@ -102,8 +102,8 @@ TEST(Stl, WindingAgainstEachOther) {
 }
 
 TEST(Stl, TrianglesWithoutArea) {
-  const std::vector<Triangle> flat{{Vec3{0, 0, 0}, Vec3{1, 0, 0}, Vec3{0.5, 1e-9, 0}},
-                                   {Vec3{2, 0, 0}, Vec3{2, 0, 0}, Vec3{3, 0, 0}}};
+  const std::vector<StlTriangle> flat{{StlPoint{0, 0, 0}, StlPoint{1, 0, 0}, StlPoint{0.5, 1e-9, 0}},
+                                   {StlPoint{2, 0, 0}, StlPoint{2, 0, 0}, StlPoint{3, 0, 0}}};
   const auto faults = mesh_faults(flat, true);
   ASSERT_GE(faults.size(), 2U);
   EXPECT_EQ(faults[0], "triangle 1, (0, 0, 0) (1, 0, 0) (0.5, 1e-09, 0), has no area");
@@ -111,8 +111,8 @@ TEST(Stl, TrianglesWithoutArea) {
 }
 
 TEST(Stl, ManyFaultsAreCounted) {
-  std::vector<Triangle> scattered;
-  for (int n = 0; n < 30; ++n) scattered.push_back({Vec3{3.0 * n, 0, 0}, Vec3{3.0 * n + 1, 0, 0}, Vec3{3.0 * n, 1, 0}});
+  std::vector<StlTriangle> scattered;
+  for (int n = 0; n < 30; ++n) scattered.push_back({StlPoint{3.0 * n, 0, 0}, StlPoint{3.0 * n + 1, 0, 0}, StlPoint{3.0 * n, 1, 0}});
   const auto faults = mesh_faults(scattered, false);
   ASSERT_EQ(faults.size(), 21U);
   EXPECT_EQ(faults.back(), "and 70 more");
