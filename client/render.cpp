@@ -66,6 +66,7 @@ class Drawing {
   // Far particles first, so that near ones lie over them.
   std::string particles() const {
     const auto count = static_cast<std::size_t>(snapshot_.speed_size());
+    const bool sized = snapshot_.diameters_size() == snapshot_.speed_size();
     std::vector<int> order(count);
     std::iota(order.begin(), order.end(), 0);
     const auto& position = snapshot_.position();
@@ -73,7 +74,8 @@ class Drawing {
     std::string rows;
     for (const int i : order) {
       rows += number_text(1e3 * position[3 * i]) + " " + number_text(1e3 * position[3 * i + 1]) + " " +
-              number_text(snapshot_.speed(i)) + "\n";
+              number_text(snapshot_.speed(i)) + " " + number_text(500 * (sized ? snapshot_.diameters(i) : snapshot_.diameter())) +
+              "\n";  // radius, mm
     }
     return rows;
   }
@@ -105,7 +107,7 @@ class Drawing {
   std::string circles(double speed_scale) const {
     const double pixels = snapshot_.diameter() * page_.scale;
     const std::string rim = pixels >= 5 ? "border lc rgb \"#303030\"" : "noborder";
-    return "plot $particles using 1:2:(" + number_text(500 * snapshot_.diameter()) + "):($3*" + number_text(speed_scale) +
+    return "plot $particles using 1:2:4:($3*" + number_text(speed_scale) +
            ") with circles fillcolor palette lw 0.35 fillstyle solid 1.0 " + rim + " notitle\n";
   }
 

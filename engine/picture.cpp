@@ -18,10 +18,12 @@ void read_particles(const CheckpointReader& reader, std::size_t most, Picture& p
   const std::vector<double> position = reader.rows("particles/position");
   const std::vector<double> velocity =
       reader.has("particles/velocity") ? reader.rows("particles/velocity") : std::vector<double>();
+  const std::vector<double> radius = reader.has("particles/radius") ? reader.rows("particles/radius") : std::vector<double>();
   const std::size_t count = position.size() / 3, stride = (count + most - 1) / most;
   for (std::size_t i = 0; i < count; i += stride) {
     picture.positions.push_back(row(position, i));
     picture.speeds.push_back(velocity.size() == position.size() ? norm(row(velocity, i)) : 0);
+    if (!radius.empty()) picture.diameters.push_back(2 * radius[i]);
   }
 }
 

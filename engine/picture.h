@@ -14,9 +14,10 @@ struct Picture {
   std::uint64_t step = 0;
   double time = 0;                   // s
   Vec3 size;                         // of the box, m
-  double diameter = 0;               // of the particles, m; 0 without particles
+  double diameter = 0;               // of the largest particles, m; 0 without particles
   std::vector<Vec3> positions;       // m
   std::vector<double> speeds;        // m/s, one a position
+  std::vector<double> diameters;     // m, one a position; empty where all are alike
   Int3 cells{};                      // of the box; 0 without gas
   std::vector<double> gas_fraction;  // ε, mean over the depth (z), x fastest, then y; empty without gas
 };

@@ -49,14 +49,19 @@ double fastest_inflow(const GasScene& gas) {
   return fastest;
 }
 
-// 2m/b, the time over which a frozen b (U − V) makes V overshoot U. b is taken at the floor of ε and at the slip of the fastest
-// inflow through it.
+// 2m/b, the time over which a frozen b (U − V) makes V overshoot U, of the particle that follows the gas the fastest. b is taken
+// at the floor of ε and at the slip of the fastest inflow through it.
 double drag_limit(const Scene& scene) {
   const double fraction = scene.coupling->fraction_floor;
-  const DragScene drag{scene.gas->setup.density, scene.gas->setup.viscosity, scene.particles->diameter()};
   const double slip = fastest_inflow(*scene.gas) / fraction;
-  const double b = std::visit([&](const auto& law) { return law(drag, slip, fraction); }, scene.coupling->drag);
-  return b > 0 ? 2 * scene.particles->mass() / b : 0;
+  double limit = 0;
+  for (const SeedKind& kind : scene.particles->kinds) {
+    const double d = kind.sizes.smallest(), mass = kind.density * std::numbers::pi / 6 * d * d * d;
+    const DragScene drag{scene.gas->setup.density, scene.gas->setup.viscosity, d};
+    const double b = std::visit([&](const auto& law) { return law(drag, slip, fraction); }, scene.coupling->drag);
+    if (b > 0) limit = limit > 0 ? std::min(limit, 2 * mass / b) : 2 * mass / b;
+  }
+  return limit;
 }
 
 void plan_time(Plan& plan) {
@@ -104,10 +109,9 @@ void plan_corners(Plan& plan) {
 
 void plan_seeds(Plan& plan) {
   const ParticleScene& particles = *plan.scene.particles;
-  if (particles.kinds.size() > 1 || !particles.kinds.front().sizes.constant())
-    throw Stop(Reason::invalid_case, "particles.types: not built yet: more than one type and size");
   const auto [low, high] = seed_extent(particles.regions);
   for (const SeedRegion& region : particles.regions) plan.particle_count += expected_count(particles.kinds, region);
+  for (const Inlet& inlet : particles.inlets) plan.entering += expected_count(particles.kinds, inlet, plan.scene.end_time);
   for (int d = 0; d < 3; ++d) {
     const double g = plan.scene.gravity[d], way = g < 0 ? high[d] : plan.scene.size[d] - low[d];
     if (std::abs(g) > 0.5 * norm(plan.scene.gravity)) plan.fall_time = std::max(plan.fall_time, std::sqrt(2 * way / std::abs(g)));
@@ -124,21 +128,21 @@ void plan_space(Plan& plan) {
   if (scene.gas) plan.ghosts = ghosts_of(scene.gas->setup.convection);
   if (scene.particles) {
     plan.tuned_skin = scene.particles->skin == 0;
-    plan.skin = plan.tuned_skin ? 0.25 * scene.particles->diameter() : scene.particles->skin;
+    plan.skin = plan.tuned_skin ? 0.25 * scene.particles->largest() : scene.particles->skin;
     if (scene.coupling) {
       const Vec3 spacing{scene.size.x / scene.cells[0], scene.size.y / scene.cells[1], scene.size.z / scene.cells[2]};
       plan.ghosts =
-          std::max(plan.ghosts, kernel_ghosts(scene.coupling->kernel, scene.particles->diameter(), spacing, plan.skin, shared));
+          std::max(plan.ghosts, kernel_ghosts(scene.coupling->kernel, scene.particles->largest(), spacing, plan.skin, shared));
     }
-    const double reach = scene.particles->diameter() + plan.skin;
+    const double reach = scene.particles->largest() + plan.skin;
     for (int d = 0; d < 3; ++d) {
-      if (!scene.gas) plan.cells[d] = std::max(1, static_cast<int>(scene.size[d] / (2 * scene.particles->diameter())));
+      if (!scene.gas) plan.cells[d] = std::max(1, static_cast<int>(scene.size[d] / (2 * scene.particles->largest())));
       const double cell = scene.size[d] / plan.cells[d];
       if (plan.ranks > 1) plan.narrowest[d] = std::max(plan.ghosts, static_cast<int>(std::ceil(reach / cell)));
       if (scene.periodic[d] && scene.size[d] < 2 * reach) {
         throw Stop(Reason::invalid_case, "domain.size: " + number(scene.size[d]) +
                                              " m in a periodic direction is less than twice the " +
-                                             "reach of the particles (particles.diameter + skin = " + number(reach) + " m)");
+                                             "reach of the particles (largest diameter + skin = " + number(reach) + " m)");
       }
       if (scene.gas && plan.skin / 2 > 0.4 * cell) {
         throw Stop(Reason::invalid_case, "particles.skin = " + number(plan.skin) + " m is too wide for cells of " + number(cell) +
@@ -163,7 +167,8 @@ void plan_cost(Plan& plan) {
   const Scene& scene = plan.scene;
   const bool history = scene.particles && scene.particles->laws.history();
   const bool rotation = scene.particles && scene.particles->laws.rotation();
-  const auto cells = static_cast<double>(plan.cell_count), particles = static_cast<double>(plan.particle_count);
+  const auto cells = static_cast<double>(plan.cell_count);
+  const auto particles = static_cast<double>(plan.particle_count + plan.entering);  // at most: some leave
   // Fields of gas, exchange and pressure solver; arrays and pair list of the particles (about 8 pairs within reach of each).
   const double field = cells > 0 ? cells * sizeof(double) : 0;
   plan.memory_bytes = 40e6 * plan.ranks + field * (scene.coupling ? 90 : 80) +
@@ -202,6 +207,27 @@ std::string kernel_text(const Scene& scene) {
   return name + ", as wide as the cells";
 }
 
+std::string sizes_text(const ParticleScene& particles) {
+  double smallest = particles.largest();
+  for (const SeedKind& kind : particles.kinds) smallest = std::min(smallest, kind.sizes.smallest());
+  return (smallest < particles.largest() ? number(smallest) + " to " : "") + number(particles.largest()) + " m";
+}
+
+void add_sizes(Plan& plan) {
+  const ParticleScene& particles = *plan.scene.particles;
+  const auto add = [&](const char* part, bool on, const std::string& why) { plan.items.push_back({part, on, why}); };
+  const auto types = particles.kinds.size();
+  const bool distributed =
+      std::any_of(particles.types.begin(), particles.types.end(), [](const ParticleType& type) { return type.distributed; });
+  add("several types", types > 1, types > 1 ? std::to_string(types) + " in particles.types" : "all are of one");
+  add("radius per particle", distributed, distributed ? "a type has more than one size" : "a type has one size");
+  add("particles that enter", !particles.inlets.empty(),
+      particles.inlets.empty() ? "no particle_inflows on any face" : "about " + std::to_string(plan.entering) + " until the end");
+  const bool outlet = std::any_of(plan.scene.sides.begin(), plan.scene.sides.end(),
+                                  [](const auto& pair) { return pair[0] == Side::outlet || pair[1] == Side::outlet; });
+  add("particles that leave", outlet, outlet ? "through outflow { particles: LEAVE }" : "one that leaves stops the run");
+}
+
 void plan_parts(Plan& plan) {
   const Scene& scene = plan.scene;
   const auto add = [&](const char* part, bool on, const std::string& why) { plan.items.push_back({part, on, why}); };
@@ -223,13 +249,13 @@ void plan_parts(Plan& plan) {
             (second ? ": two layers of ghosts" : ": first order"));
   }
   add("particles and contacts", scene.particles.has_value(),
-      scene.particles ? std::to_string(plan.particle_count) + " of d = " + number(scene.particles->diameter()) + " m"
+      scene.particles ? std::to_string(plan.particle_count) + " of d = " + sizes_text(*scene.particles)
                       : "the case has no particles");
   if (scene.particles) {
     const bool rotation = scene.particles->laws.rotation(), history = scene.particles->laws.history();
     add("rotation", rotation, rotation ? "the tangential law turns the particles" : "without friction nothing turns them");
     add("contact history", history, history ? "the tangential spring remembers" : "the tangential law has no memory");
-    add("radius per particle", false, "all have one size");
+    add_sizes(plan);
     add("walls within the box", !scene.walls.empty(), scene.walls.empty() ? "the case has none" : walls_text(scene.walls));
     const bool settling = scene.particles->settling.has_value();
     add("settling before time 0", settling, settling ? "asked for by the seeding" : "not asked for");
@@ -269,7 +295,7 @@ void check_coupling(Plan& plan) {
   const Scene& scene = plan.scene;
   if (!scene.coupling) return;
   plan.cell_ratio =
-      std::cbrt(scene.size.x * scene.size.y * scene.size.z / static_cast<double>(plan.cell_count)) / scene.particles->diameter();
+      std::cbrt(scene.size.x * scene.size.y * scene.size.z / static_cast<double>(plan.cell_count)) / scene.particles->largest();
   plan.drag_limit = drag_limit(scene);
   const auto [name, limited] =
       std::visit([&](const auto& scheme) { return std::pair(std::string(scheme.name), scheme.limited(plan.step, plan.substep)); },
@@ -328,6 +354,11 @@ std::string Plan::text() const {
     line("collision time tau", number(scene.particles->collision_time) + " s");
     line("sub-step dt_DEM", number(substep) + " s, " + std::to_string(substeps) + " a step");
     line("skin of the pair list", number(skin) + (tuned_skin ? " m at the start, then tuned" : " m"));
+    for (const SeedKind& kind : scene.particles->kinds) {
+      if (kind.sizes.constant()) continue;
+      line("sizes of " + kind.name, number(kind.sizes.smallest()) + " to " + number(kind.sizes.largest()) + " m, mean " +
+                                        number(kind.sizes.mean()) + " m, d32 " + number(kind.sizes.sauter()) + " m");
+    }
   }
   line(scene.gas ? "gas step dt_CFD" : "step", number(step) + " s, not below " + number(shortest_step) + " s");
   if (corners.size() > 1) line("instants that steps end on", std::to_string(corners.size() - 1) + " before the end");

@@ -35,7 +35,8 @@ struct Plan {
 
   double cell_ratio = 0;  // Δ*; 0 unless gas and particles
   std::int64_t cell_count = 0, particle_count = 0, steps = 0;
-  int substeps = 0;  // per step
+  std::int64_t entering = 0;  // particles until the end
+  int substeps = 0;           // per step
   double memory_bytes = 0, checkpoint_bytes = 0, seconds = 0;
   std::vector<PlanItem> items;
   std::vector<std::string> warnings;

@@ -15,13 +15,19 @@ void write_plot_files(const Comm& comm, const std::filesystem::path& folder, con
   if (const Dem* dem = simulation.particles()) {
     const ParticleStore& store = dem->particles();
     const std::size_t n = store.owned;
-    std::vector<double> speed(n);
-    for (std::size_t p = 0; p < n; ++p) speed[p] = norm(store.velocity(p));
+    std::vector<double> speed(n), diameter(n);
+    for (std::size_t p = 0; p < n; ++p) {
+      speed[p] = norm(store.velocity(p));
+      diameter[p] = 2 * radius_of(dem->setup(), store, p);
+    }
     std::vector<PlotArray> arrays{
         {"id", "", std::vector<std::int64_t>(store.id.begin(), store.id.begin() + static_cast<std::ptrdiff_t>(n))},
         {"velocity", "m/s", store.velocities()},
         {"speed", "m/s", std::move(speed)},
-        {"diameter", "m", std::vector<double>(n, 2 * dem->setup().types.front().radius)}};
+        {"diameter", "m", std::move(diameter)}};
+    if (dem->setup().types.size() > 1)
+      arrays.push_back(
+          {"type", "", std::vector<std::int64_t>(store.type.begin(), store.type.begin() + static_cast<std::ptrdiff_t>(n))});
     if (dem->setup().rotation) arrays.push_back({"spin", "rad/s", store.spins()});
     write_particle_plot(comm, folder, simulation.steps(), simulation.time(), store.positions(), arrays);
   }

@@ -163,7 +163,8 @@ class Run {
       write_plots_due();
       report_progress("running");
       const Agreement agreed = agree();
-      if (agreed.failure) return {agreed.failure.reason, agreed.failure.message};
+      if (agreed.failure)
+        return {agreed.failure.reason, agreed.failure.message + ", in step " + std::to_string(simulation_->steps())};
       if (agreed.cancel_now) return {Reason::cancelled, "cancelled without a checkpoint"};
       if (agreed.checkpoint || agreed.suspend || agreed.cancel || agreed.wall_limit) write_checkpoint_now();
       if (agreed.cancel) return {Reason::cancelled, "cancelled; the last checkpoint is kept"};
@@ -181,6 +182,13 @@ class Run {
     if (simulation_) {
       totals_.reason = outcome.reason;
       totals_.settling_seconds = settling_seconds_;
+      totals_.particles = simulation_->particle_count();
+      totals_.turnover = simulation_->turnover();
+      totals_.sizes = simulation_->size_moments();
+      if (const Insertion* insertion = simulation_->insertion()) {
+        totals_.mass_due = insertion->mass_due(simulation_->time());
+        for (const InletState& state : insertion->states()) totals_.blocked_steps += static_cast<std::uint64_t>(state.blocked);
+      }
       if (const Dem* dem = simulation_->particles()) totals_.list_rebuilds = static_cast<std::uint64_t>(dem->rebuilds());
       try {
         write_summary(comm_, options_.folder / "summary.json", plan_, timer_, totals_);
@@ -241,8 +249,10 @@ class Run {
   void count_step() {
     ++totals_.steps;
     totals_.simulated_seconds += simulation_->last_step();
+    const auto particles = static_cast<std::uint64_t>(simulation_->particle_count());
+    totals_.particle_steps += particles;
+    totals_.particle_substeps += (simulation_->substeps() - totals_.substeps) * particles;
     totals_.substeps = simulation_->substeps();
-    totals_.particle_substeps = simulation_->substeps() * static_cast<std::uint64_t>(simulation_->particle_count());
     totals_.cell_steps += static_cast<std::uint64_t>(plan_.cell_count);
     totals_.gas_iterations += static_cast<std::uint64_t>(simulation_->gas_outcome().iterations);
     totals_.pressure_iterations += static_cast<std::uint64_t>(simulation_->gas_outcome().pressure_iterations);

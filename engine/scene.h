@@ -1,6 +1,7 @@
 // A case as the engine sees it: laws, numbers and places, no protobuf. case/ makes it, plan.* decides what of it is built.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <optional>
@@ -14,6 +15,7 @@
 #include "models/exchange.h"
 #include "models/kernel.h"
 #include "particles/dem.h"
+#include "particles/insertion.h"
 #include "particles/seeding.h"
 #include "statistics/monitors.h"
 
@@ -36,6 +38,7 @@ struct ParticleScene {
   std::vector<SeedKind> kinds;      // types, one at least
   std::vector<ParticleType> types;  // the same, as contacts see them
   std::vector<SeedRegion> regions;  // where they are at time 0
+  std::vector<Inlet> inlets;        // where they enter later
   std::optional<Settling> settling;
   double collision_time = 0;       // τ, s: the smallest over pairs and walls
   double steps_per_collision = 0;  // dt_DEM = τ/steps
@@ -43,8 +46,11 @@ struct ParticleScene {
   ContactLaws laws;
   bool verlet = false;  // velocity Verlet, else symplectic Euler
 
-  double diameter() const { return 2 * types.front().radius; }
-  double mass() const { return types.front().mass(); }
+  double largest() const {  // diameter, m
+    double largest = 0;
+    for (const ParticleType& type : types) largest = std::max(largest, 2 * type.radius);
+    return largest;
+  }
 };
 
 struct CouplingScene {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <numbers>
 #include <utility>
 
 #include "grid/rows.h"
@@ -63,12 +64,13 @@ Simulation::CouplingPart::CouplingPart(const Decomposition& decomposition, const
     : exchange(gas.grid),
       transfer(decomposition, gas.grid, gas.halo,
                {.kernel = plan.scene.coupling->kernel,
-                .diameter = plan.scene.particles->diameter(),
-                .particle_volume = plan.scene.particles->mass() / plan.scene.particles->types.front().density,
-                .mass = plan.scene.particles->mass(),
+                .diameter = plan.scene.particles->largest(),
+                .particle_volume = std::numbers::pi / 6 * std::pow(plan.scene.particles->largest(), 3),
+                .mass = plan.scene.particles->types.front().mass(),
                 .gravity = plan.scene.gravity,
                 .fraction_floor = plan.scene.coupling->fraction_floor,
-                .scheme = plan.scene.coupling->scheme},
+                .scheme = plan.scene.coupling->scheme,
+                .types = plan.scene.particles->types},
                timer),
       fraction_before(gas.grid) {}
 
@@ -78,8 +80,13 @@ Simulation::Simulation(const Plan& plan, const Comm& comm, PhaseTimer& timer)
       decomposition_(comm, plan.cells, plan.scene.size, plan.scene.periodic, plan.tall, plan.narrowest),
       controller_(plan) {
   if (plan.scene.gas) gas_ = std::make_unique<GasPart>(decomposition_, plan_, timer_);
-  if (plan.scene.particles)
+  if (plan.scene.particles) {
     dem_ = std::make_unique<Dem>(decomposition_, dem_setup(plan_), plan.scene.particles->laws, timer_, plan.scene.walls);
+  }
+  if (plan.scene.particles && !plan.scene.particles->inlets.empty()) {
+    const ParticleScene& particles = *plan_.scene.particles;
+    insertion_ = std::make_unique<Insertion>(decomposition_, dem_->setup(), particles.kinds, particles.inlets);
+  }
   if (plan.scene.coupling) coupling_ = std::make_unique<CouplingPart>(decomposition_, plan_, *gas_, timer_);
   audit_exchange_ =
       coupling_ && std::any_of(plan.scene.monitors.begin(), plan.scene.monitors.end(), [](const MonitorSetup& monitor) {
@@ -100,6 +107,7 @@ void Simulation::step() {
   if (audit_exchange_) audit_exchange();
   if (dem_) advance_particles(dt);  // contacts, walls, motion, in sub-steps
   time_ = controller_.end(time_, dt);
+  if (dem_) turn_over_particles(dt);  // some have entered, some have left
   last_step_ = dt;
   ++steps_;
 }
@@ -116,7 +124,7 @@ void Simulation::deposit_volume() {
 }
 
 void Simulation::find_drag() {
-  const DragScene scene{plan_.scene.gas->setup.density, plan_.scene.gas->setup.viscosity, plan_.scene.particles->diameter()};
+  const DragScene scene{plan_.scene.gas->setup.density, plan_.scene.gas->setup.viscosity, plan_.scene.particles->largest()};
   std::visit([&](const auto& law) { coupling_->transfer.find_drag(law, scene, dem_->particles(), gas_->state); },
              plan_.scene.coupling->drag);
 }
@@ -141,8 +149,8 @@ StepLimit Simulation::step_limit() const {
     }
   }
   if (coupling_ && std::holds_alternative<Explicit>(scene.coupling->scheme) && plan_.longest_step > plan_.step) {
-    const double b = decomposition_.comm().max(coupling_->transfer.largest_drag()), most = scene.particles->mass() / b;
-    if (b > 0 && most < limit.longest) limit = {most, "the drag of the particles allows m/b = " + number(most) + " s"};
+    const double rate = decomposition_.comm().max(coupling_->transfer.fastest_response()), most = 1 / rate;
+    if (rate > 0 && most < limit.longest) limit = {most, "the drag of the particles allows m/b = " + number(most) + " s"};
   }
   return limit;
 }
@@ -219,8 +227,11 @@ void Simulation::seed() {
   }
   if (dem_) {
     const ParticleScene& particles = *plan_.scene.particles;
-    dem_->set_particles(keep_owned(decomposition_, seed_spheres(particles.kinds, particles.regions)));
-    particle_count_ = decomposition_.comm().sum(static_cast<std::int64_t>(dem_->particles().owned));
+    const std::vector<PlacedSphere> spheres = seed_spheres(particles.kinds, particles.regions);
+    dem_->set_particles(keep_owned(decomposition_, dem_->setup(), spheres));
+    next_id_ = static_cast<std::int64_t>(spheres.size());
+    turnover_.initial = present();
+    particle_count_ = turnover_.initial.count;
   }
   if (coupling_) hidden_solids_ = coupling_->transfer.deposit_volume(dem_->particles(), gas_->state.fraction);
 }
@@ -239,7 +250,7 @@ bool Simulation::settle() {
   dem_->take_wall_loads();
   // Not before the highest has had the time to fall: at the start all are slow.
   const double energy = decomposition_.comm().sum(dem_->kinetic_energy());
-  const double speed = std::sqrt(2 * energy / (static_cast<double>(particle_count_) * plan_.scene.particles->mass()));
+  const double speed = std::sqrt(2 * energy / turnover_.initial.mass);
   if (settled_time_ < settling.duration && (settled_time_ < plan_.fall_time || speed > settling.rest_velocity)) return true;
   if (coupling_) hidden_solids_ = coupling_->transfer.deposit_volume(dem_->particles(), gas_->state.fraction);
   for (GasResponse& response : dem_->particles().gas_response) response = {};  // no gas has been felt
@@ -262,8 +273,9 @@ Observation Simulation::observation() {
   now.momentum_residual = exchange_residual_;
   if (dem_) {
     now.particles = &dem_->particles();
-    now.radius = plan_.scene.particles->diameter() / 2;
-    now.mass = plan_.scene.particles->mass();
+    now.types = &dem_->setup();
+    now.mass_entered = turnover_.entered.mass;
+    now.mass_left = turnover_.left.mass;
     now.max_overlap = max_overlap_;
     now.wall_loads = wall_loads_;
   }

@@ -11,6 +11,9 @@
 #include "coupling/transfer.h"
 #include "gas/gas_solver.h"
 #include "particles/dem.h"
+#include "particles/insertion.h"
+#include "particles/sizes.h"
+#include "particles/turnover.h"
 #include "plan.h"
 #include "step_controller.h"
 
@@ -41,6 +44,9 @@ class Simulation {
   double last_step() const { return last_step_; }                  // s, taken
   std::uint64_t substeps() const { return substeps_; }             // of this process
   std::int64_t particle_count() const { return particle_count_; }  // all ranks
+  const Turnover& turnover() const { return turnover_; }           // of particles, since time 0
+  const Insertion* insertion() const { return insertion_.get(); }  // null: nothing enters
+  std::vector<SizeMoments> size_moments() const;                   // of the particles that there are, a type; collective
   const GasOutcome& gas_outcome() const { return gas_outcome_; }
   GasBalance gas_balance() const { return gas_->solver.balance(); }  // of the last step; with gas only
   const Failure& failure() const;                                    // of this rank, to be voted on
@@ -82,8 +88,14 @@ class Simulation {
   double advance_gas(double dt);
   void note(const std::string& change);
   void advance_particles(double dt);
+  void turn_over_particles(double dt);
+  Amount amount_here() const;
+  Amount present() const;
   void audit_exchange();
+  void put_particles(CheckpointContent& content) const;
   void put_contacts(CheckpointContent& content) const;
+  void put_turnover(CheckpointContent& content) const;
+  void restore_turnover(const CheckpointReader& from);
   void restore_gas(const CheckpointReader& from);
   void restore_particles(const CheckpointReader& from);
 
@@ -92,6 +104,7 @@ class Simulation {
   Decomposition decomposition_;
   std::unique_ptr<GasPart> gas_;  // null: the scene has none of it
   std::unique_ptr<Dem> dem_;
+  std::unique_ptr<Insertion> insertion_;
   std::unique_ptr<CouplingPart> coupling_;
 
   std::uint64_t steps_ = 0, substeps_ = 0;
@@ -102,7 +115,8 @@ class Simulation {
   std::vector<WallLoad> wall_loads_;  // of the last step
   bool audit_exchange_ = false;       // a monitor asks for it
   double exchange_residual_ = 0;
-  std::int64_t particle_count_ = 0;
+  std::int64_t particle_count_ = 0, next_id_ = 0;
+  Turnover turnover_;
   GasOutcome gas_outcome_;
   std::vector<std::string> notes_;
 };

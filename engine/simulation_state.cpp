@@ -86,45 +86,62 @@ CheckpointContent Simulation::checkpoint() const {
     }
   }
   if (dem_) {
-    const ParticleStore& store = dem_->particles();
-    const std::size_t n = store.owned;
-    content.numbers["particles/diameter"] = plan_.scene.particles->diameter();
-    content.numbers["particles/count"] = static_cast<double>(particle_count_);
-    content.numbers["particles/total_mass"] = static_cast<double>(particle_count_) * plan_.scene.particles->mass();
-    Vec3 momentum;
-    for (std::size_t p = 0; p < n; ++p) momentum += plan_.scene.particles->mass() * store.velocity(p);
-    for (int d = 0; d < 3; ++d) {
-      content.numbers[std::string("particles/total_momentum_") + "xyz"[d]] = decomposition_.comm().sum(momentum[d]);
-    }
+    put_particles(content);
+    if (dem_->setup().history || dem_->setup().rolling_history) put_contacts(content);
+    put_turnover(content);
+  }
+  return content;
+}
+
+void Simulation::put_particles(CheckpointContent& content) const {
+  const ParticleStore& store = dem_->particles();
+  const DemSetup& setup = dem_->setup();
+  const std::size_t n = store.owned;
+  const Amount there = present();
+  content.numbers["particles/diameter"] = plan_.scene.particles->largest();
+  content.numbers["particles/types"] = static_cast<double>(setup.types.size());
+  content.numbers["particles/count"] = static_cast<double>(there.count);
+  content.numbers["particles/total_mass"] = there.mass;
+  if (plan_.tuned_skin) {
     const Dem::Tuning tuning = dem_->tuning();
     content.numbers["particles/skin"] = tuning.skin;
     content.numbers["particles/skin_substeps"] = static_cast<double>(tuning.counts.substeps);
     content.numbers["particles/skin_rebuilds"] = static_cast<double>(tuning.counts.rebuilds);
-    content.arrays.push_back(rows("particles/position", "m", "centres", store.positions()));
-    content.arrays.push_back(rows("particles/velocity", "m/s", "velocities V", store.velocities()));
-    if (dem_->setup().rotation) {
-      content.arrays.push_back(rows("particles/spin", "rad/s", "angular velocities ω", store.spins()));
-    }
-    if (dem_->setup().gas == GasForce::relaxed) {
-      std::vector<Vec3> debts;
-      for (const GasResponse& response : store.gas_response) debts.push_back(response.debt);
-      content.arrays.push_back(rows("particles/gas_debt", "N·s", "received from the gas beyond what the gas has lost", debts));
-    }
-    content.arrays.push_back({"particles/id", "", "identity, for life",
-                              std::vector<std::int64_t>(store.id.begin(), store.id.begin() + static_cast<std::ptrdiff_t>(n)),
-                              std::nullopt, 1});
-    content.arrays.push_back(rows("particles/position_at_rebuild", "m",
-                                  "centres when the pair list was last built, as the ranks hold them",
-                                  dem_->positions_at_rebuild()));
-    if (dem_->setup().verlet) {
-      std::vector<Vec3> forces(n), torques(n);
-      for (std::size_t p = 0; p < n; ++p) forces[p] = store.previous[p].force, torques[p] = store.previous[p].torque();
-      content.arrays.push_back(rows("particles/contact_force", "N", "by contacts in the last sub-step", forces));
-      content.arrays.push_back(rows("particles/contact_torque", "N m", "by contacts in the last sub-step", torques));
-    }
-    if (dem_->setup().history || dem_->setup().rolling_history) put_contacts(content);
   }
-  return content;
+  Vec3 momentum;
+  for (std::size_t p = 0; p < n; ++p) momentum += mass_of(setup, store, p) * store.velocity(p);
+  for (int d = 0; d < 3; ++d) {
+    content.numbers[std::string("particles/total_momentum_") + "xyz"[d]] = decomposition_.comm().sum(momentum[d]);
+  }
+  content.arrays.push_back(rows("particles/position", "m", "centres", store.positions()));
+  content.arrays.push_back(rows("particles/velocity", "m/s", "velocities V", store.velocities()));
+  if (setup.rotation) content.arrays.push_back(rows("particles/spin", "rad/s", "angular velocities ω", store.spins()));
+  if (setup.gas == GasForce::relaxed) {
+    std::vector<Vec3> debts;
+    for (const GasResponse& response : store.gas_response) debts.push_back(response.debt);
+    content.arrays.push_back(rows("particles/gas_debt", "N·s", "received from the gas beyond what the gas has lost", debts));
+  }
+  const auto end = static_cast<std::ptrdiff_t>(n);
+  const auto integers = [&](const char* name, const char* meaning, const auto& values) {
+    content.arrays.push_back(
+        {name, "", meaning, std::vector<std::int64_t>(values.begin(), values.begin() + end), std::nullopt, 1});
+  };
+  integers("particles/id", "identity, for life", store.id);
+  if (setup.types.size() > 1) integers("particles/type", "place among the case's types", store.type);
+  if (setup.types.size() > 1 || setup.distributed()) {
+    std::vector<double> radii(n);
+    for (std::size_t p = 0; p < n; ++p) radii[p] = radius_of(setup, store, p);
+    content.arrays.push_back({"particles/radius", "m", "radii", std::move(radii), std::nullopt, 1});
+  }
+  content.arrays.push_back(rows("particles/position_at_rebuild", "m",
+                                "centres when the pair list was last built, as the ranks hold them",
+                                dem_->positions_at_rebuild()));
+  if (setup.verlet) {
+    std::vector<Vec3> forces(n), torques(n);
+    for (std::size_t p = 0; p < n; ++p) forces[p] = store.previous[p].force, torques[p] = store.previous[p].torque();
+    content.arrays.push_back(rows("particles/contact_force", "N", "by contacts in the last sub-step", forces));
+    content.arrays.push_back(rows("particles/contact_torque", "N m", "by contacts in the last sub-step", torques));
+  }
 }
 
 // What contacts remember. A memory that the laws do not keep is 0.
@@ -170,7 +187,8 @@ void Simulation::restore(const CheckpointReader& from) {
   if (from.has("gas/pressure") != static_cast<bool>(gas_) || from.has("particles/position") != static_cast<bool>(dem_)) {
     throw Stop(Reason::invalid_case, "the checkpoint is of another scene: gas and particles must be there in both or in neither");
   }
-  if (dem_) same("particles/diameter", "particles.diameter", plan_.scene.particles->diameter());
+  if (dem_) same("particles/diameter", "the largest diameter", plan_.scene.particles->largest());
+  if (dem_) same("particles/types", "the number of types", static_cast<double>(dem_->setup().types.size()));
   steps_ = from.step();
   time_ = from.time();
   controller_.restore(from.number("controller/step_size"), static_cast<int>(from.number("controller/good_steps")));
@@ -202,8 +220,12 @@ void Simulation::restore_particles(const CheckpointReader& from) {
   const std::vector<Vec3> spins =
       from.has("particles/spin") ? vectors(from.rows("particles/spin")) : std::vector<Vec3>(positions.size());
   const std::vector<std::int64_t> ids = from.integer_rows("particles/id");
-  for (std::size_t p = 0; p < ids.size(); ++p) store.add(ids[p], positions[p], velocities[p], spins[p]);
-  if (dem_->setup().gas == GasForce::relaxed) {
+  const DemSetup& setup = dem_->setup();
+  const auto types = setup.types.size() > 1 ? from.integer_rows("particles/type") : std::vector<std::int64_t>(ids.size());
+  const auto radii = setup.distributed() ? from.rows("particles/radius") : std::vector<double>(ids.size());
+  for (std::size_t p = 0; p < ids.size(); ++p)
+    store.add(setup, ids[p], positions[p], velocities[p], spins[p], static_cast<int>(types[p]), radii[p]);
+  if (setup.gas == GasForce::relaxed) {
     store.gas_force.resize(store.owned);
     store.gas_response.resize(store.owned);
     if (from.has("particles/gas_debt")) {
@@ -246,6 +268,7 @@ void Simulation::restore_particles(const CheckpointReader& from) {
                       {static_cast<std::int64_t>(from.number("particles/skin_substeps")),
                        static_cast<std::int64_t>(from.number("particles/skin_rebuilds"))}});
   }
+  restore_turnover(from);
   dem_->restore(std::move(store), std::move(at_rebuild), pairs, walls);
 }
 

@@ -50,6 +50,31 @@ json phase_entry(const char* unit, double seconds, double units) {
   return entry;
 }
 
+// Moments of the diameters of each type, m and kg.
+json sizes_entry(const ParticleScene& particles, const std::vector<SizeMoments>& sizes) {
+  json entries = json::array();
+  for (std::size_t k = 0; k < sizes.size(); ++k)
+    entries.push_back({{"type", particles.kinds[k].name},
+                       {"count", sizes[k].count},
+                       {"mean", sizes[k].mean},
+                       {"deviation", sizes[k].deviation},
+                       {"sauter", sizes[k].sauter},
+                       {"smallest", sizes[k].smallest},
+                       {"largest", sizes[k].largest},
+                       {"mass", sizes[k].mass}});
+  return entries;
+}
+
+// Particles since time 0, kg.
+json turnover_entry(const RunTotals& totals) {
+  const auto entry = [](const Amount& amount) { return json{{"count", amount.count}, {"mass", amount.mass}}; };
+  return {{"initial", entry(totals.turnover.initial)},
+          {"entered", entry(totals.turnover.entered)},
+          {"left", entry(totals.turnover.left)},
+          {"mass_due", totals.mass_due},
+          {"blocked_steps", totals.blocked_steps}};
+}
+
 }  // namespace
 
 void write_summary(const Comm& comm, const std::filesystem::path& path, const Plan& plan, const PhaseTimer& timer,
@@ -60,7 +85,7 @@ void write_summary(const Comm& comm, const std::filesystem::path& path, const Pl
 
   const auto particle_substeps = static_cast<double>(totals.particle_substeps),
              cell_steps = static_cast<double>(totals.cell_steps);
-  const double particle_steps = static_cast<double>(plan.particle_count) * static_cast<double>(totals.steps);
+  const double particle_steps = static_cast<double>(totals.particle_steps);
   double gas = 0, transfer = 0, dem = 0, busy = 0, steps = 0, talk = 0, most_work = 0;
   json phases, ranks = json::array();
   for (int rank = 0; rank < comm.size(); ++rank) {
@@ -96,13 +121,17 @@ void write_summary(const Comm& comm, const std::filesystem::path& path, const Pl
                   {"simulated_seconds", totals.simulated_seconds},
                   {"steps", totals.steps},
                   {"substeps", totals.substeps},
-                  {"particles", plan.particle_count},
+                  {"particles", totals.particles},
                   {"cells", plan.cell_count},
                   {"list_rebuilds", totals.list_rebuilds},
                   {"gas_iterations", totals.gas_iterations},
                   {"pressure_iterations", totals.pressure_iterations},
                   {"phases", phases},
                   {"per_rank", ranks}};
+  if (plan.scene.particles) {
+    summary["particle_sizes"] = sizes_entry(*plan.scene.particles, totals.sizes);
+    summary["turnover"] = turnover_entry(totals);
+  }
   if (particle_substeps > 0) summary["particle_substep_microseconds"] = dem * 1e6 / particle_substeps;
   if (cell_steps > 0) summary["gas_cell_step_microseconds"] = gas * 1e6 / cell_steps;
   if (steps > 0) summary["communication_share"] = talk / steps;

@@ -7,6 +7,8 @@
 #include "base/phase_timer.h"
 #include "base/stop.h"
 #include "parallel/comm.h"
+#include "particles/sizes.h"
+#include "particles/turnover.h"
 #include "plan.h"
 
 namespace bedflow {
@@ -16,8 +18,14 @@ struct RunTotals {
   std::uint64_t steps = 0, substeps = 0;  // of this attempt
   double simulated_seconds = 0;           // of this attempt
   double settling_seconds = 0;            // wall, before the steps
+  std::uint64_t particle_steps = 0;       // all ranks
   std::uint64_t particle_substeps = 0;    // all ranks
   std::uint64_t cell_steps = 0;           // all ranks
+  std::int64_t particles = 0;             // at the end
+  std::vector<SizeMoments> sizes;         // of these, a type
+  Turnover turnover;
+  double mass_due = 0;              // kg of particles that found no room to enter yet
+  std::uint64_t blocked_steps = 0;  // in which one found none, of all inlets
   std::uint64_t list_rebuilds = 0, gas_iterations = 0, pressure_iterations = 0;
   double step_seconds = 0;  // wall, of this rank in steps
   Traffic traffic;          // of this rank in steps

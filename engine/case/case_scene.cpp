@@ -142,6 +142,7 @@ ParticleScene particle_scene(const v1::Case& from) {
   ParticleScene scene;
   scene.kinds = seed_kinds(particles);
   scene.regions = seed_regions(from, scene.kinds);
+  scene.inlets = particle_inlets(from, scene.kinds);
   std::vector<ContactType> types;
   for (const SeedKind& kind : scene.kinds) {
     types.push_back({kind.name, {kind.sizes.largest() / 2, kind.density, !kind.sizes.constant()}, kind.sizes.smallest() / 2});
@@ -266,8 +267,7 @@ Statistic statistic(const v1::Case& scene, const v1::Monitor& from) {
 }
 
 Side side(const v1::Face& face) {
-  if (face.particle_inflows_size() > 0 || face.outflow().particles() == v1::LEAVE)
-    throw Stop(Reason::invalid_case, "domain.faces: not built yet: particles that enter or leave");
+  if (face.outflow().particles() == v1::LEAVE) return Side::outlet;
   return face.has_outflow() && !face.outflow().screen() ? Side::open : Side::wall;
 }
 

@@ -1,6 +1,7 @@
 #include "case/seeding_scene.h"
 
 #include <algorithm>
+#include <limits>
 
 namespace bedflow {
 
@@ -123,6 +124,27 @@ std::vector<SeedRegion> seed_regions(const v1::Case& from, const std::vector<See
   }
   if (!particles.has_composed() && !particles.has_empty()) result.push_back(regions.region("particles", particles, {}));
   return result;
+}
+
+std::vector<Inlet> particle_inlets(const v1::Case& from, const std::vector<SeedKind>& kinds) {
+  const v1::Faces& f = from.domain().faces();
+  const v1::Face* const faces[] = {&f.x_low(), &f.x_high(), &f.y_low(), &f.y_high(), &f.z_low(), &f.z_high()};
+  const v1::Lengths& size = from.domain().size();
+  std::vector<Inlet> inlets;
+  for (int face = 0; face < 6; ++face)
+    for (const v1::ParticleInflow& inflow : faces[face]->particle_inflows())
+      inlets.push_back({.direction = face / 2,
+                        .side = face % 2,
+                        .low = inflow.has_patch() ? vec(inflow.patch().low()) : Vec3{},
+                        .high = inflow.has_patch() ? vec(inflow.patch().high()) : Vec3{size.x(), size.y(), size.z()},
+                        .rate = inflow.has_mass_rate() ? inflow.mass_rate() : inflow.number_rate(),
+                        .basis = inflow.has_mass_rate() ? Basis::mass : Basis::number,
+                        .velocity = vec(inflow.velocity()),
+                        .shares = kind_shares(from.particles(), kinds, inflow.types()),
+                        .from = inflow.from(),
+                        .until = inflow.has_until() ? inflow.until() : std::numeric_limits<double>::infinity(),
+                        .seed = inflow.seed()});
+  return inlets;
 }
 
 const v1::Settling* settling_of(const v1::Particles& particles) {

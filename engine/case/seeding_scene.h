@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "bedflow/v1/case.pb.h"
+#include "particles/insertion.h"
 #include "particles/seeding.h"
 
 namespace bedflow {
@@ -17,6 +18,9 @@ using TypeShares = google::protobuf::RepeatedPtrField<v1::TypeShare>;
 std::vector<double> kind_shares(const v1::Particles& particles, const std::vector<SeedKind>& kinds, const TypeShares& named);
 
 std::vector<SeedRegion> seed_regions(const v1::Case& from, const std::vector<SeedKind>& kinds);
+
+// Of all faces.
+std::vector<Inlet> particle_inlets(const v1::Case& from, const std::vector<SeedKind>& kinds);
 
 // Of the seeding, whichever way it is told; null: none is asked for.
 const v1::Settling* settling_of(const v1::Particles& particles);

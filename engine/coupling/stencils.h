@@ -26,12 +26,14 @@ class Stencils {
 
   // Shares beyond the ends of a lattice fold onto its last points. A lattice shorter than `points` has shares of 0 beyond its
   // end, where there must be ghosts.
-  template <class Kernel>
-  void locate(const Kernel& kernel, double diameter, const Grid& grid, const Lattices& lattices, const ParticleStore& particles) {
+  template <class Kernel, class DiameterOf>
+  void locate(const Kernel& kernel, DiameterOf diameter_of, const Grid& grid, const Lattices& lattices,
+              const ParticleStore& particles) {
     rows_.resize(particles.owned);
     const Vec3 per_spacing{1 / grid.spacing.x, 1 / grid.spacing.y, 1 / grid.spacing.z};
     for (std::size_t p = 0; p < particles.owned; ++p) {
       const Vec3 place = particles.position(p);
+      const double diameter = diameter_of(p);  // m
       Row& row = rows_[p];
       std::int32_t first[2][3];
       for (int d = 0; d < 3; ++d) {

@@ -43,7 +43,6 @@ Transfer::Transfer(const Decomposition& decomposition, const Grid& grid, Halo& h
       halo_(halo),
       setup_(setup),
       relaxes_(std::visit([](const auto& scheme) { return scheme.relaxes; }, setup.scheme)),
-      weight_(setup.mass * setup.gravity),
       timer_(timer),
       lattices_(decomposition, grid),
       stencils_(stencils_for(kernel_points(setup.kernel, setup.diameter, grid.spacing), grid)),
@@ -58,8 +57,26 @@ Transfer::Transfer(const Decomposition& decomposition, const Grid& grid, Halo& h
 
 // ---------------------------------------------------------------------------------------------------- volume
 
+void Transfer::find_sizes(const ParticleStore& particles) {
+  const bool alike = particles.type.empty() && particles.radius.empty();
+  const std::size_t count = alike ? 1 : particles.owned;
+  sizes_.step = alike ? 0 : 1;
+  sizes_.diameter.assign(count, setup_.diameter);
+  sizes_.volume.assign(count, setup_.particle_volume);
+  sizes_.mass.assign(count, setup_.mass);
+  for (std::size_t p = 0; p < count && !alike; ++p) {
+    const ParticleType& type = setup_.types[particles.type.empty() ? 0 : particles.type[p]];
+    const double radius = particles.radius.empty() ? type.radius : particles.radius[p];
+    sizes_.diameter[p] = 2 * radius;
+    sizes_.mass[p] = type.mass_of(radius);
+    sizes_.volume[p] = sizes_.mass[p] / type.density;
+  }
+}
+
 void Transfer::locate(const ParticleStore& particles) {
-  std::visit([&](auto& stencils, const auto& kernel) { stencils.locate(kernel, setup_.diameter, grid_, lattices_, particles); },
+  find_sizes(particles);
+  const auto diameter_of = [&](std::size_t p) { return sizes_.diameter_of(p); };
+  std::visit([&](auto& stencils, const auto& kernel) { stencils.locate(kernel, diameter_of, grid_, lattices_, particles); },
              stencils_, setup_.kernel);
 }
 
@@ -67,11 +84,11 @@ double Transfer::deposit_volume(const ParticleStore& particles, Field& fraction)
   const PhaseTimer::Scope scope(timer_, Phase::deposit, particles.owned);
   fraction.fill(0);
   double* solids = fraction.data();
-  const double share = setup_.particle_volume / grid_.cell_volume();
   locate(particles);
   std::visit(
       [&]<int points>(const Stencils<points>& stencils) {
         for (std::size_t p = 0; p < particles.owned; ++p) {
+          const double share = sizes_.volume_of(p) / grid_.cell_volume();
           const auto shares = stencils[p];
           const double* x = stencils.x_shares(shares, cell_centres);
           stencils.each_row(shares, cell_centres, [&](std::ptrdiff_t at, double weight) {
@@ -149,8 +166,15 @@ void Transfer::find_drag(const Drag& drag, const DragScene& scene, const Particl
   drag_.resize(particles.owned);
   const double *slip = slip_.data(), *fraction = fraction_.data();
   double* b = drag_.data();
+  if (sizes_.step == 0) {
 #pragma GCC ivdep
-  for (std::size_t p = 0; p < particles.owned; ++p) b[p] = drag(scene, slip[p], fraction[p]);
+    for (std::size_t p = 0; p < particles.owned; ++p) b[p] = drag(scene, slip[p], fraction[p]);
+  } else {
+    const double* diameter = sizes_.diameter.data();
+#pragma GCC ivdep
+    for (std::size_t p = 0; p < particles.owned; ++p)
+      b[p] = drag(DragScene{scene.density, scene.viscosity, diameter[p]}, slip[p], fraction[p]);
+  }
 }
 
 template void Transfer::find_drag(const GidaspowBlended&, const DragScene&, const ParticleStore&, const GasState&);
@@ -167,17 +191,17 @@ template void Transfer::find_drag(const ConstantDrag&, const DragScene&, const P
 
 // b, bV and buoyancy of every particle to the points around it, as the gas is to lose them.
 void Transfer::spread(const ParticleStore& particles, Exchange& exchange) {
-  const double share = setup_.particle_volume / grid_.cell_volume();
   paid_ = {};
   std::visit(
       [&]<int points>(const Stencils<points>& stencils) {
         for (std::size_t p = 0; p < particles.owned; ++p) {
+          const double share = sizes_.volume_of(p) / grid_.cell_volume();
           const auto shares = stencils[p];
           const double felt = relaxes_ ? felt_[p] : 1, b = felt * drag_[p];
           Vec3 momentum = b * particles.velocity(p);
           if (relaxes_) {
             const Vec3 debt = (1 / step_.dt) * particles.gas_response[p].debt;
-            momentum += (1 - felt) * weight_ - debt;
+            momentum += (1 - felt) * sizes_.mass_of(p) * setup_.gravity - debt;
             paid_ += debt;
           }
           for (int d = 0; d < 3; ++d) {
@@ -252,7 +276,7 @@ void Transfer::deposit_drag(const ParticleStore& particles, const Interval& step
     std::visit(
         [&](const auto& scheme) {
           for (std::size_t p = 0; p < particles.owned; ++p)
-            felt_[p] = scheme.felt(drag_[p] * step.dt / setup_.mass, step.substeps);
+            felt_[p] = scheme.felt(drag_[p] * step.dt / sizes_.mass_of(p), step.substeps);
         },
         setup_.scheme);
   }
@@ -294,7 +318,7 @@ void Transfer::pull(const GasState& gas, ParticleStore& particles) {
               u = stencils.sum(shares, d, velocity[d].data());
               slope = stencils.sum(shares, d, gradient_[d].data());
             }
-            particles.gas_force[p][d] = b * (u - particles.velocity(p)[d]) - setup_.particle_volume * slope;
+            particles.gas_force[p][d] = b * (u - particles.velocity(p)[d]) - sizes_.volume_of(p) * slope;
           }
         }
       },
@@ -307,11 +331,11 @@ void Transfer::respond(const Scheme& scheme, ParticleStore& particles) {
   for (std::size_t p = 0; p < particles.owned; ++p) {
     Vec3& force = particles.gas_force[p];
     GasResponse& response = particles.gas_response[p];
-    response.debt = -step_.dt * (felt_[p] * force - (1 - felt_[p]) * weight_);
+    response.debt = -step_.dt * (felt_[p] * force - (1 - felt_[p]) * sizes_.mass_of(p) * setup_.gravity);
     for (int d = 0; d < 3; ++d)
       if (!lattices_.has_faces(d)) response.debt[d] = 0;  // nothing but the walls can take it
     response.drag = Scheme::anew ? 0 : drag_[p];
-    response.share = scheme.felt_in_substep(response.drag * step_.dt / step_.substeps / setup_.mass);
+    response.share = scheme.felt_in_substep(response.drag * step_.dt / step_.substeps / sizes_.mass_of(p));
     force += response.drag * particles.velocity(p);
   }
 }

@@ -30,13 +30,14 @@ inline constexpr int most_points = 4;
 int kernel_ghosts(const Kernel& kernel, double diameter, Vec3 spacing, double skin, bool shared);
 
 struct TransferSetup {
-  Kernel kernel{};
-  double diameter = 0;           // of a particle, m
+  Kernel kernel{};               // a Gaussian is as wide as the largest particle makes it
+  double diameter = 0;           // of a particle, of the largest where there are several sizes, m
   double particle_volume = 0;    // m³
   double mass = 0;               // kg; as gravity, for schemes that relax
   Vec3 gravity{};                // m/s²
   double fraction_floor = 0.35;  // of ε
   ExchangeScheme scheme{};
+  std::vector<ParticleType> types = {};  // where there are several types or sizes: volumes and masses are then each's own
 };
 
 // What the particles do while the gas takes a step.
@@ -71,8 +72,12 @@ class Transfer {
   // b, bV and buoyancy to the faces, as the gas is to lose them in the step, with what it still owes (models/exchange.h).
   void deposit_drag(const ParticleStore& particles, const Interval& step, Exchange& exchange);
 
-  // b of the last find_drag, this rank, kg/s.
-  double largest_drag() const { return drag_.empty() ? 0 : *std::max_element(drag_.begin(), drag_.end()); }
+  // The largest b/m of the last find_drag, this rank, 1/s.
+  double fastest_response() const {
+    double fastest = 0;
+    for (std::size_t p = 0; p < drag_.size(); ++p) fastest = std::max(fastest, drag_[p] / sizes_.mass_of(p));
+    return fastest;
+  }
 
   // From the gas at the end of the step: F_g = −𝒱∇p + b (U − V) of every particle into gas_force, and for schemes that relax how
   // it follows V into gas_response.
@@ -86,6 +91,15 @@ class Transfer {
 
  private:
   using Share = double __attribute__((vector_size(32)));  // b, bV, solids of a face, and nothing: added as one
+  // Of all particles alike, or one a particle.
+  struct Sizes {
+    std::vector<double> diameter, volume, mass;  // m, m³, kg
+    std::size_t step = 0;
+    double diameter_of(std::size_t p) const { return diameter[p * step]; }
+    double volume_of(std::size_t p) const { return volume[p * step]; }
+    double mass_of(std::size_t p) const { return mass[p * step]; }
+  };
+  void find_sizes(const ParticleStore& particles);
   // U as a particle feels it: that of the gas, or smoothed.
   const FaceField& felt_velocity(const FaceField& velocity);
   void slips(const ParticleStore& particles, const FaceField& velocity, const Field& fraction);
@@ -104,12 +118,12 @@ class Transfer {
   Halo& halo_;
   TransferSetup setup_;
   bool relaxes_;
-  Vec3 weight_;  // m g
   PhaseTimer& timer_;
   Lattices lattices_;
   std::optional<Smoothing> smoothing_;
   std::variant<Stencils<2>, Stencils<3>, Stencils<4>> stencils_;
   Interval step_;
+  Sizes sizes_;
   std::vector<double> slip_, fraction_, drag_, felt_;  // of each owned particle: |U − V|, ε, b, ψ
   Vec3 paid_;                                          // debts of this rank's particles that the gas pays in the step, N
   std::array<std::vector<Share>, 3> shares_;           // of the faces of each direction, in a field's order; 0 between sweeps

@@ -21,11 +21,11 @@ class Decomposition {
   Int3 ranks() const { return ranks_; }  // blocks a direction
   Int3 place() const { return place_; }  // of this rank's block among them
   Int3 global_cells() const { return global_cells_; }
-  Int3 first() const { return first_; }  // this block's first cell
-  Int3 cells() const { return cells_; }  // this block's cells
+  Int3 first() const { return first_; }                                                          // this block's first cell
+  Int3 cells() const { return cells_; }                                                          // this block's cells
   int cells(int d, int place) const { return first_cell(d, place + 1) - first_cell(d, place); }  // of the blocks at that place
-  Vec3 size() const { return size_; }    // of the whole box, m
-  Vec3 low() const { return low_; }      // this block's corners, m
+  Vec3 size() const { return size_; }                                                            // of the whole box, m
+  Vec3 low() const { return low_; }                                                              // this block's corners, m
   Vec3 high() const { return high_; }
   bool periodic(int d) const { return periodic_[d]; }
 

@@ -8,6 +8,7 @@
 #include "base/check.h"
 #include "particles/integrate.h"
 #include "particles/migration.h"
+#include "particles/outflow.h"
 
 namespace bedflow {
 
@@ -108,6 +109,13 @@ void Dem::restore(ParticleStore particles, const std::vector<Vec3>& positions_at
     place_ = particles_.positions();
   }
   build_list();
+}
+
+void Dem::enter(const std::vector<Newcomer>& newcomers) {
+  if (newcomers.empty() || stopped_) return;
+  for (const Newcomer& newcomer : newcomers)
+    if (decomposition_.owner(newcomer.position) == decomposition_.comm().rank()) newcomers_.push_back(newcomer);
+  rebuild();
 }
 
 std::vector<Vec3> Dem::positions_at_rebuild() const {
@@ -222,6 +230,15 @@ void Dem::rebuild() {
   list_.save(particles_, now_, history_);
   walls_.save(now_, history_);
   drop_ghosts();
+  const Amount gone = take_departed_particles(decomposition_.size(), setup_, particles_, history_);
+  departed_.count += gone.count;
+  departed_.mass += gone.mass;
+  for (const Newcomer& n : newcomers_) {
+    particles_.add(setup_, n.id, n.position, n.velocity, {}, n.type, n.radius);
+    history_.append_particle();
+  }
+  newcomers_.clear();
+  particles_.each_array(setup_, [&](auto& array) { array.resize(particles_.owned); });
   {
     const PhaseTimer::Scope migration(timer_, Phase::migration, particles_.owned);
     migrate(decomposition_, setup_, particles_, history_);
@@ -299,12 +316,14 @@ bool Dem::judge(std::size_t row, double dt) {
   if (!finite(x) || !finite(v)) return say(Reason::diverged, "is not finite; try more particles.steps_per_collision");
   for (int face = 0; face < 6; ++face) {
     const Side side = setup_.sides[face / 2][face % 2];
-    if (side == Side::periodic || faces_[face].distance(x) >= 0) continue;
+    if (side == Side::periodic || side == Side::outlet || faces_[face].distance(x) >= 0) continue;
     std::ostringstream what;
     what << (side == Side::wall ? "passed the wall " : "left through the open face ") << "xyz"[face / 2]
          << (face % 2 == 0 ? "_low" : "_high")
-         << (side == Side::wall ? " (a stiffer contact or more particles.steps_per_collision would hold it)"
-                                : " (a larger domain.size would keep it, or outflow { screen: true } on that face)");
+         << (side == Side::wall
+                 ? " (a stiffer contact or more particles.steps_per_collision would hold it)"
+                 : " (a larger domain.size or outflow { screen: true } on that face would keep it, outflow { particles: LEAVE } "
+                   "would count it out)");
     return say(Reason::particle_lost, what.str());
   }
   if (const std::string* wall = walls_.passed(x)) {

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "base/phase_timer.h"
@@ -18,6 +19,7 @@
 #include "particles/pair_list.h"
 #include "particles/skin_tuner.h"
 #include "particles/store.h"
+#include "particles/turnover.h"
 #include "particles/walls.h"
 
 namespace bedflow {
@@ -32,6 +34,12 @@ class Dem {
   const DemSetup& setup() const { return setup_; }
   const ParticleStore& particles() const { return particles_; }
   ParticleStore& particles() { return particles_; }
+
+  // Particles that enter, the same on all ranks, each taken by its owner; the list is rebuilt. Collective.
+  void enter(const std::vector<Newcomer>& newcomers);
+  // What left through outlets since the last take, this rank. A particle is taken out when the pair list is rebuilt: until then
+  // it is beyond the face by half a skin at most, and goes on pushing those behind it.
+  Amount take_departed() { return std::exchange(departed_, {}); }
 
   // Replaces all particles of this rank, each inside this rank's block (ghosts are made here). Collective.
   void set_particles(ParticleStore particles);
@@ -61,7 +69,8 @@ class Dem {
   // What the particles of this rank did to the faces of the box and to the walls, the mean over the sub-steps since the last
   // take.
   std::vector<WallLoad> take_wall_loads();
-  double kinetic_energy() const;  // J, this rank, translation and rotation
+  bool stopped() const { return stopped_; }  // by a failure on any rank, agreed by all
+  double kinetic_energy() const;             // J, this rank, translation and rotation
 
   // What a checkpoint must hold beside the particles so that the same ranks go on with the same bits: the places at the
   // last rebuild of the pair list, and the histories of touching contacts. A pair across ranks is told by one of them.
@@ -109,6 +118,8 @@ class Dem {
   double now_ = 0;               // number of the last sub-step
   double deepest_ = 0;
   std::int64_t contacts_ = 0, rebuilds_ = 0;
+  std::vector<Newcomer> newcomers_;  // of this rank, until the list is rebuilt
+  Amount departed_;
   Failure failure_;
   bool stopped_ = false;  // agreed by all ranks
 };

@@ -84,7 +84,7 @@ void PairList::build_near(const DemSetup& setup, const std::array<Plane, 6>& fac
   near.clear();
   for (int face = 0; face < 6; ++face) {
     const Side side = setup.sides[face / 2][face % 2];
-    if (side == Side::periodic) continue;
+    if (side == Side::periodic || side == Side::outlet) continue;
     for (std::size_t i = 0; i < places.size(); ++i) {
       const double reach = 0.5 * setup.skin + (side == Side::wall ? radius_of(setup, particles, i) : 0);
       if (faces[face].distance(places[i]) < reach) near.push_back({static_cast<std::uint32_t>(i), face});

@@ -252,18 +252,22 @@ std::vector<PlacedSphere> seed_spheres(const std::vector<SeedKind>& kinds, const
   return all;
 }
 
-ParticleStore keep_owned(const Decomposition& decomposition, const std::vector<PlacedSphere>& spheres) {
+ParticleStore keep_owned(const Decomposition& decomposition, const DemSetup& setup, const std::vector<PlacedSphere>& spheres) {
   ParticleStore store;
-  for (std::size_t i = 0; i < spheres.size(); ++i)
-    if (decomposition.owner(spheres[i].position) == decomposition.comm().rank())
-      store.add(static_cast<std::int64_t>(i), spheres[i].position, spheres[i].velocity, spheres[i].spin);
+  for (std::size_t i = 0; i < spheres.size(); ++i) {
+    const PlacedSphere& s = spheres[i];
+    if (decomposition.owner(s.position) == decomposition.comm().rank())
+      store.add(setup, static_cast<std::int64_t>(i), s.position, s.velocity, s.spin, s.kind, s.diameter / 2);
+  }
   return store;
 }
 
 namespace {
 
 ParticleStore seed_one(const Decomposition& decomposition, double radius, const SeedRegion& region) {
-  return keep_owned(decomposition, seed_spheres({{"particles", SizeDistribution(ConstantSize{2 * radius}), 1}}, {region}));
+  DemSetup setup;
+  setup.types = {{radius, 1, false}};
+  return keep_owned(decomposition, setup, seed_spheres({{"particles", SizeDistribution(ConstantSize{2 * radius}), 1}}, {region}));
 }
 
 }  // namespace

@@ -69,7 +69,7 @@ SeedExtent seed_extent(const std::vector<SeedRegion>& regions);
 std::vector<PlacedSphere> seed_spheres(const std::vector<SeedKind>& kinds, const std::vector<SeedRegion>& regions);
 
 // Those that this rank's block owns; the id is the place in the list.
-ParticleStore keep_owned(const Decomposition& decomposition, const std::vector<PlacedSphere>& spheres);
+ParticleStore keep_owned(const Decomposition& decomposition, const DemSetup& setup, const std::vector<PlacedSphere>& spheres);
 
 // One kind of one size in one region.
 ParticleStore seed_random(const Decomposition& decomposition, double radius, const RandomSeeds& seeds);

@@ -11,7 +11,7 @@
 
 namespace bedflow {
 
-enum class Side { wall, open, periodic };  // what a face of the box is for particles
+enum class Side { wall, open, outlet, periodic };  // what a face of the box is for particles: through an outlet they may leave
 
 // Spheres of one material and one size, or one range of sizes.
 struct ParticleType {
@@ -51,6 +51,10 @@ struct DemSetup {
 
   bool distributed() const {
     return std::any_of(types.begin(), types.end(), [](const ParticleType& type) { return type.distributed; });
+  }
+  bool has_outlet() const {
+    return std::any_of(sides.begin(), sides.end(),
+                       [](const auto& pair) { return pair[0] == Side::outlet || pair[1] == Side::outlet; });
   }
   double largest_radius() const {
     double result = 0;
@@ -108,6 +112,12 @@ struct ParticleStore {
     spin_z.push_back(turn.z);
     id.push_back(identity);
     owned = rows.size();
+  }
+  // The same of any type and size.
+  void add(const DemSetup& setup, std::int64_t identity, Vec3 place, Vec3 speed, Vec3 turn, int kind, double size) {
+    add(identity, place, speed, turn);
+    if (setup.types.size() > 1) type.push_back(static_cast<std::uint8_t>(kind));
+    if (setup.distributed()) radius.push_back(size);
   }
   // Calls f(array) for every array that such a setup keeps for owned particles.
   template <class Apply>

@@ -19,6 +19,7 @@ std::string snapshot_of(const std::filesystem::path& checkpoint, std::uint32_t m
   for (const Vec3& place : picture.positions)
     for (int d = 0; d < 3; ++d) snapshot.add_position(static_cast<float>(place[d]));
   for (const double speed : picture.speeds) snapshot.add_speed(static_cast<float>(speed));
+  for (const double diameter : picture.diameters) snapshot.add_diameters(static_cast<float>(diameter));
   snapshot.mutable_cells()->set_x(static_cast<std::uint32_t>(picture.cells[0]));
   snapshot.mutable_cells()->set_y(static_cast<std::uint32_t>(picture.cells[1]));
   snapshot.mutable_cells()->set_z(static_cast<std::uint32_t>(picture.cells[2]));

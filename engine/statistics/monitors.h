@@ -36,8 +36,8 @@ struct Observation {
   double pressure_fall = 0;                  // upward, beside that of `pressure` (a driven periodic flow's), Pa/m
   const Field* fraction = nullptr;           // ε
   const ParticleStore* particles = nullptr;  // of this rank
-  double radius = 0, mass = 0;               // of a particle, m, kg
   std::vector<WallLoad> wall_loads{};        // in the step, the mean, this rank; of the faces of the box, then of the walls
+  const DemSetup* types = nullptr;           // of the particles
   double max_overlap = 0;                    // in the step, over the diameter, this rank
   double mass_residual = 0;                  // in the step, the same on every rank
   double momentum_residual = 0;              // in the step, the same on every rank

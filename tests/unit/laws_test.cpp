@@ -59,9 +59,5 @@ TEST(Laws, OfTheSchemaAreThoseOfTheCode) {
   EXPECT_EQ(arms(v1::Coupling::descriptor(), "exchange"), NamesOf<ExchangeScheme>::get());
 }
 
-TEST(Laws, AnArmThatIsNotBuiltIsNotCounted) {
-  EXPECT_FALSE(arms(v1::Coupling::descriptor(), "kernel").contains("gaussian"));
-}
-
 }  // namespace
 }  // namespace bedflow

@@ -10,6 +10,12 @@
 namespace bedflow {
 namespace {
 
+DemSetup spheres_of_two_kilograms() {
+  DemSetup setup;
+  setup.types = {{.radius = 0.01, .density = 2 / (4e-6 / 3 * std::numbers::pi), .distributed = false}};
+  return setup;
+}
+
 constexpr double round_off = 1e-13;  // relative, of sums of tens of terms in any order
 
 // A box 0.4 × 0.8 × 0.2 m of 4 × 8 × 2 cells with room for fields and particles.
@@ -37,6 +43,7 @@ struct Box {
     --particles.owned;
   }
   void clear() { particles = {}; }
+  DemSetup types = spheres_of_two_kilograms();
   Observation observation() const {
     return {
         .decomposition = decomposition,
@@ -44,8 +51,7 @@ struct Box {
         .pressure = &pressure,
         .fraction = &fraction,
         .particles = &particles,
-        .radius = 0.01,
-        .mass = 2,
+        .types = &types,
     };
   }
 };

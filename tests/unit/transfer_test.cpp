@@ -89,6 +89,45 @@ TEST(Transfer, DepositedVolumeIsTheParticlesVolumeNextToWallsAndCornersToo) {
   });
 }
 
+// Types and sizes of their own: each particle fills its own volume, drags by the law at its own diameter, floats by its own
+// volume.
+TEST(Transfer, EachParticleActsByItsOwnSize) {
+  Bed bed({8, 12, 6});
+  const std::vector<double> of_type{0.05, 0.08};
+  Transfer transfer(bed.decomposition, bed.grid, bed.halo,
+                    {.diameter = 0.08, .fraction_floor = 0.01, .types = {{0.025, 900, false}, {0.04, 2500, false}}}, bed.timer);
+  const auto sphere = [](double d) { return std::numbers::pi / 6 * d * d * d; };
+  for (const bool distributed : {false, true}) {
+    std::vector<double> diameters;
+    bed.particles.type.clear();
+    bed.particles.radius.clear();
+    for (std::size_t p = 0; p < bed.particles.owned; ++p) {
+      bed.particles.type.push_back(static_cast<std::uint8_t>(bed.particles.id[p] % 2));
+      diameters.push_back(distributed ? 0.04 + 1e-4 * static_cast<double>(bed.particles.id[p]) : of_type[bed.particles.type[p]]);
+      if (distributed) bed.particles.radius.push_back(diameters[p] / 2);
+    }
+    bed.stir_gas();
+    transfer.deposit_volume(bed.particles, bed.gas.fraction);
+    double solids = 0, volume = 0, drag = 0, b = 0;
+    bed.each_cell([&](int i, int j, int k) { solids += (1 - bed.gas.fraction(i, j, k)) * bed.grid.cell_volume(); });
+    for (const double d : diameters) volume += sphere(d);
+    const Comm& comm = bed.decomposition.comm();
+    EXPECT_NEAR(comm.sum(solids) / comm.sum(volume), 1, 1e-12);
+    // At rest in clear gas Wen & Yu's b is Stokes' 3πμd (times ε^-2.65, which is 1 within the solids' own share).
+    for (int d = 0; d < 3; ++d) bed.gas.velocity[d].fill(0);
+    for (std::size_t p = 0; p < bed.particles.owned; ++p) bed.particles.velocity(p) = {};
+    bed.gas.fraction.fill(1);
+    transfer.find_drag(WenYu{}, {1.2, 1.8e-5, 0.08}, bed.particles, bed.gas);
+    transfer.deposit_drag(bed.particles, {}, bed.exchange);
+    for (const double d : diameters) b += 3 * std::numbers::pi * 1.8e-5 * d;
+    bed.each_cell([&](int i, int j, int k) { drag += bed.exchange.drag[2](i, j, k); });  // z is periodic: all faces are inside
+    EXPECT_NEAR(comm.sum(drag) / comm.sum(b), 1, 1e-12);
+    transfer.sample(bed.gas, bed.particles);
+    const ExchangeBalance balance = transfer.balance(bed.gas, bed.exchange, bed.particles);
+    for (int d = 0; d < 3; ++d) EXPECT_NEAR(balance.lost_by_gas[d], balance.received_by_particles[d], 1e-12 * balance.scale[d]);
+  }
+}
+
 TEST(Transfer, WhatTheFloorHidesIsCounted) {
   Bed bed({5, 8, 4});
   ParticleStore heap;
