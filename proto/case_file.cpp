@@ -12,8 +12,8 @@
 #include "case_parser.h"
 #include "case_rules.h"
 #include "case_walker.h"
-#include "sphere_table.h"
 #include "mesh_file.h"
+#include "sphere_table.h"
 
 namespace bedflow {
 namespace {

@@ -103,7 +103,7 @@ TEST(Stl, WindingAgainstEachOther) {
 
 TEST(Stl, TrianglesWithoutArea) {
   const std::vector<StlTriangle> flat{{StlPoint{0, 0, 0}, StlPoint{1, 0, 0}, StlPoint{0.5, 1e-9, 0}},
-                                   {StlPoint{2, 0, 0}, StlPoint{2, 0, 0}, StlPoint{3, 0, 0}}};
+                                      {StlPoint{2, 0, 0}, StlPoint{2, 0, 0}, StlPoint{3, 0, 0}}};
   const auto faults = mesh_faults(flat, true);
   ASSERT_GE(faults.size(), 2U);
   EXPECT_EQ(faults[0], "triangle 1, (0, 0, 0) (1, 0, 0) (0.5, 1e-09, 0), has no area");
@@ -112,7 +112,8 @@ TEST(Stl, TrianglesWithoutArea) {
 
 TEST(Stl, ManyFaultsAreCounted) {
   std::vector<StlTriangle> scattered;
-  for (int n = 0; n < 30; ++n) scattered.push_back({StlPoint{3.0 * n, 0, 0}, StlPoint{3.0 * n + 1, 0, 0}, StlPoint{3.0 * n, 1, 0}});
+  for (int n = 0; n < 30; ++n)
+    scattered.push_back({StlPoint{3.0 * n, 0, 0}, StlPoint{3.0 * n + 1, 0, 0}, StlPoint{3.0 * n, 1, 0}});
   const auto faults = mesh_faults(scattered, false);
   ASSERT_EQ(faults.size(), 21U);
   EXPECT_EQ(faults.back(), "and 70 more");
