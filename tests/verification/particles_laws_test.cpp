@@ -56,16 +56,18 @@ struct Glass {
 Glass spring() {
   const auto contact = LinearSpringDashpot::from_restitution(1.72e7, 1);
   const double mass = ParticleType{radius, density, false}.mass();
-  return {
-      {Spheres::everywhere(contact), Spheres::everywhere(TangentialSpring::from_normal(friction, contact, 1.48 / 1.72)), {}, {}},
-      contact.collision_time(mass)};
+  return {{Spheres{}.everywhere(contact),
+           Spheres{}.everywhere(TangentialSpring::from_normal(friction, contact, 1.48 / 1.72)),
+           {},
+           {}},
+          contact.collision_time(mass)};
 }
 Glass hertz_mindlin() {
   const double e1 = 380e9, nu1 = 0.23, e2 = 70e9, nu2 = 0.25;
   const auto contact = Hertz::from_restitution(1 / ((1 - nu1 * nu1) / e1 + (1 - nu2 * nu2) / e2), 1);
   const double shear = 1 / (2 * (1 + nu1) * (2 - nu1) / e1 + 2 * (1 + nu2) * (2 - nu2) / e2);
   const double mass = ParticleType{radius, density, false}.mass();
-  return {{Spheres::everywhere(contact), Spheres::everywhere(Mindlin{friction, shear, 0}), {}, {}},
+  return {{Spheres{}.everywhere(contact), Spheres{}.everywhere(Mindlin{friction, shear, 0}), {}, {}},
           contact.collision_time(mass, radius, speed)};
 }
 
@@ -86,7 +88,7 @@ TEST(ObliqueImpact, LawsWithMemoryFollowKharaz) {
 // Without memory nothing turns the contact point back: it leaves rolling below tan θ = 3.5 μf (1 + e).
 TEST(ObliqueImpact, CoulombLeavesRollingBelowTheCriticalAngle) {
   Glass glass = spring();
-  glass.laws.tangential = Spheres::everywhere(Coulomb{friction});
+  glass.laws.tangential = Spheres{}.everywhere(Coulomb{friction});
   for (const double degrees : {5.0, 15.0, 30.0}) EXPECT_NEAR(strike(glass.laws, glass.time, degrees).tangential, 5.0 / 7, 2e-3);
   // Above it all slide, and the laws agree: 1 − μf (1 + e) cot θ.
   for (const double degrees : {40.0, 50.0, 60.0}) {
