@@ -1,0 +1,108 @@
+// The state of the particles: set, restored, told.
+#include <unordered_map>
+#include <utility>
+
+#include "particles/dem.h"
+#include "particles/migration.h"
+
+namespace bedflow {
+
+void Dem::set_particles(ParticleStore particles) {
+  restore(std::move(particles), {}, {}, {});
+}
+
+void Dem::restore(ParticleStore particles, const std::vector<Vec3>& positions_at_rebuild, const std::vector<PairHistory>& pairs,
+                  const std::vector<WallHistory>& walls) {
+  const PhaseTimer::Scope scope(timer_, Phase::pairs, particles.owned);
+  const Comm& comm = decomposition_.comm();
+  particles_ = std::move(particles);
+  drop_ghosts();
+  if (!setup_.rotation)
+    for (std::size_t i = 0; i < particles_.owned; ++i) particles_.set_spin(i, {});
+  const bool fresh = !comm.any(!positions_at_rebuild.empty());
+  place_ = fresh ? particles_.positions() : positions_at_rebuild;
+  failure_ = {};
+  contacts_ = 0;
+  look_for_lost(0);
+  stopped_ = comm.any(static_cast<bool>(failure_));
+  if (stopped_) return;
+
+  history_.clear(particles_.owned);
+  if (setup_.history || setup_.rolling_history) {
+    std::vector<PairHistory> pairs_here = pairs;
+    std::vector<WallHistory> walls_here = walls;
+    redistribute(comm, particles_.id, pairs_here, walls_here);
+    std::unordered_map<std::int64_t, std::size_t> row;
+    for (std::size_t i = 0; i < particles_.owned; ++i) row[particles_.id[i]] = i;
+    for (const PairHistory& pair : pairs_here) {
+      if (const auto low = row.find(pair.low); low != row.end()) history_.add(low->second, pair.high, pair.memory);
+      if (const auto high = row.find(pair.high); high != row.end()) history_.add(high->second, pair.low, -pair.memory);
+    }
+    for (const WallHistory& wall : walls_here)
+      history_.add(row.at(wall.id), ContactHistory::wall_contact(wall.wall), wall.memory);
+  }
+  if (fresh) {
+    migrate(decomposition_, setup_, particles_, history_);
+    place_ = particles_.positions();
+  }
+  build_list();
+}
+
+void Dem::enter(const std::vector<Newcomer>& newcomers) {
+  if (newcomers.empty() || stopped_) return;
+  for (const Newcomer& newcomer : newcomers)
+    if (decomposition_.owner(newcomer.position) == decomposition_.comm().rank()) newcomers_.push_back(newcomer);
+  rebuild();
+}
+
+std::vector<Vec3> Dem::positions_at_rebuild() const {
+  return {place_.begin(), place_.begin() + static_cast<std::ptrdiff_t>(particles_.owned)};
+}
+
+std::vector<PairHistory> Dem::pair_histories() const {
+  std::vector<PairHistory> result;
+  list_.each_pair_memory(now_, [&](std::size_t p, const ContactMemory& memory) {
+    const auto [first, second] = list_.pairs[p];
+    if (first >= particles_.owned) return;
+    const std::int64_t a = particles_.id[first], b = particles_.id[second];
+    result.push_back(a < b ? PairHistory{a, b, memory} : PairHistory{b, a, -memory});
+  });
+  return result;
+}
+
+std::vector<WallHistory> Dem::wall_histories() const {
+  std::vector<WallHistory> result;
+  list_.each_wall_memory(now_, [&](std::size_t w, const ContactMemory& memory) {
+    result.push_back({particles_.id[list_.near[w].particle], list_.near[w].face, memory});
+  });
+  const std::vector<WallHistory> of_walls = walls_.histories(particles_, now_);
+  result.insert(result.end(), of_walls.begin(), of_walls.end());
+  return result;
+}
+
+std::vector<WallLoad> Dem::take_wall_loads() {
+  std::vector<WallLoad> result(loads_.size());
+  result.swap(loads_);
+  for (WallLoad& load : result) {
+    load.force *= 1.0 / std::max(loaded_, 1);
+    load.torque *= 1.0 / std::max(loaded_, 1);
+  }
+  loaded_ = 0;
+  return result;
+}
+
+double Dem::take_max_overlap() {
+  return std::exchange(deepest_, 0);
+}
+
+double Dem::kinetic_energy() const {
+  double energy = 0;
+  for (std::size_t i = 0; i < particles_.owned; ++i) {
+    const double mass = mass_of(setup_, particles_, i), inertia = inertia_of(mass, radius_of(setup_, particles_, i));
+    const Vec3 v = particles_.velocity(i), spin = particles_.spin(i);
+    energy += 0.5 * (mass * dot(v, v) + inertia * dot(spin, spin));
+  }
+  return energy;
+}
+
+}  // namespace bedflow
