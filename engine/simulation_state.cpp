@@ -269,7 +269,7 @@ void Simulation::restore_particles(const CheckpointReader& from) {
                        static_cast<std::int64_t>(from.number("particles/skin_rebuilds"))}});
   }
   restore_turnover(from);
-  dem_->restore(std::move(store), std::move(at_rebuild), pairs, walls);
+  dem_->restore(std::move(store), at_rebuild, pairs, walls);
 }
 
 }  // namespace bedflow

@@ -57,6 +57,7 @@ std::vector<SizeMoments> Simulation::size_moments() const {
   for (std::size_t p = 0; p < store.owned; ++p)
     sums[store.type.empty() ? 0 : store.type[p]].add(2 * radius_of(setup, store, p), mass_of(setup, store, p));
   std::vector<SizeMoments> moments;
+  moments.reserve(sums.size());
   for (const SizeSums& of_type : sums) moments.push_back(of_type.over_all(decomposition_.comm()));
   return moments;
 }

@@ -33,7 +33,7 @@ int kernel_ghosts(const Kernel& kernel, double diameter, Vec3 spacing, double sk
   if (!shared) return beyond_end;
   const auto* dpvm = std::get_if<SquareDpvm>(&kernel);
   const double half_width = dpvm ? 0.5 * dpvm->width * diameter : 0.5 * narrowest;
-  return std::max(beyond_end, static_cast<int>((half_width + skin / 2) / narrowest + 0.5) + 1);
+  return std::max(beyond_end, static_cast<int>(std::lround((half_width + skin / 2) / narrowest)) + 1);
 }
 
 Transfer::Transfer(const Decomposition& decomposition, const Grid& grid, Halo& halo, const TransferSetup& setup,

@@ -10,6 +10,7 @@ namespace bedflow {
 namespace {
 
 using Message = std::vector<double>;
+constexpr std::size_t double_size = sizeof(double);
 
 double packed(std::int64_t value) {
   return std::bit_cast<double>(value);
@@ -27,7 +28,7 @@ class Reader {
     if constexpr (std::is_same_v<T, std::uint8_t>) {
       return static_cast<std::uint8_t>(integer());
     } else {
-      std::array<double, sizeof(T) / sizeof(double)> doubles;
+      std::array<double, sizeof(T) / double_size> doubles;
       for (double& value : doubles) value = number();
       return std::bit_cast<T>(doubles);
     }
@@ -44,7 +45,7 @@ void put_element(Message& message, std::uint8_t type) {
 }
 template <class T>
 void put_element(Message& message, const T& element) {
-  const auto doubles = std::bit_cast<std::array<double, sizeof(T) / sizeof(double)>>(element);
+  const auto doubles = std::bit_cast<std::array<double, sizeof(T) / double_size>>(element);
   message.insert(message.end(), doubles.begin(), doubles.end());
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <compare>
 
 namespace bedflow {
 
@@ -142,10 +143,10 @@ void Walls::recall(Meeting& meeting, double now) {
   const auto mine = [&](const Meeting& other) {
     return std::pair(other.wall, other.contact.particle) <=> std::pair(meeting.wall, meeting.contact.particle);
   };
-  while (behind_ < before_.size() && mine(before_[behind_]) < 0) ++behind_;
+  while (behind_ < before_.size() && std::is_lt(mine(before_[behind_]))) ++behind_;
   double nearest = same_contact;
   const Meeting* found = nullptr;
-  for (std::size_t b = behind_; b < before_.size() && mine(before_[b]) == 0; ++b) {
+  for (std::size_t b = behind_; b < before_.size() && std::is_eq(mine(before_[b])); ++b) {
     const double common = dot(before_[b].contact.n, meeting.contact.n);
     if (common <= nearest || !(remembers(before_[b].displacement, now - 1) || remembers(before_[b].angle, now - 1))) continue;
     nearest = common;
