@@ -8,8 +8,8 @@
 namespace bedflow {
 
 // For gmock's messages.
-void PrintTo(const CaseDifference& difference, std::ostream* out) {
-  *out << difference.path << ": " << difference.first << " | " << difference.second;
+std::ostream& operator<<(std::ostream& out, const CaseDifference& difference) {
+  return out << difference.path << ": " << difference.first << " | " << difference.second;
 }
 
 namespace {

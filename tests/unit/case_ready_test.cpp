@@ -15,12 +15,8 @@
 namespace bedflow {
 namespace {
 
-using testing::Each;
-using testing::Field;
 using testing::HasSubstr;
 using testing::IsEmpty;
-using testing::StartsWith;
-using testing::UnorderedElementsAreArray;
 
 const std::vector<std::string> beds{"goldschmidt-1.25", "goldschmidt-1.5", "goldschmidt-2", "mueller", "link-b1",
                                     "link-b2",          "link-b3",         "sscp-2",        "sscp-3",  "sscp-4"};

@@ -23,7 +23,6 @@ using testing::AllOf;
 using testing::Contains;
 using testing::HasSubstr;
 using testing::IsEmpty;
-using testing::Not;
 
 const v1::Parameter& parameter_of(const FieldDescriptor* field) {
   return field->options().GetExtension(v1::parameter);

@@ -124,7 +124,7 @@ TEST(Comm, TrafficIsWhatWasSentToOthers) {
   const Comm world = Comm::world();
   const int next = (world.rank() + 1) % world.size(), previous = (world.rank() + world.size() - 1) % world.size();
   const Traffic before = world.traffic();
-  const Comm copy = world;
+  const Comm copy = world;  // NOLINT(performance-unnecessary-copy-initialization): that is what is tested
   const std::vector<double> sent(5, 1.0);
   std::vector<double> received;
   copy.exchange(next, sent, previous, received);

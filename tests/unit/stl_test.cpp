@@ -112,6 +112,7 @@ TEST(Stl, TrianglesWithoutArea) {
 
 TEST(Stl, ManyFaultsAreCounted) {
   std::vector<StlTriangle> scattered;
+  scattered.reserve(30);
   for (int n = 0; n < 30; ++n)
     scattered.push_back({StlPoint{3.0 * n, 0, 0}, StlPoint{3.0 * n + 1, 0, 0}, StlPoint{3.0 * n, 1, 0}});
   const auto faults = mesh_faults(scattered, false);

@@ -28,10 +28,10 @@ TEST(Plate, TakesExactlyItsPressureDrop) {
       for (int n = 0; n < 100; ++n) ASSERT_TRUE(box.step(0.01).converged);  // a projection's pressure settles step by step
       const double drop = plate.linear * speed + plate.quadratic * 1.2 * speed * speed;
       EXPECT_NEAR((*box.state.jump)[along](along == 0 ? 5 : 1, along == 1 ? 5 : 1, along == 2 ? 5 : 1), drop, 1e-7 * drop);
-      box.for_cells([&](int i, int j, int k) {
+      box.for_cells([&, through = speed / epsilon](int i, int j, int k) {
         const int at[3] = {i, j, k};
         EXPECT_NEAR(box.state.pressure(i, j, k), 3 + (at[along] < 5 ? drop : 0), 1e-7 * drop);  // tolerance
-        EXPECT_NEAR(box.state.velocity[along](i, j, k), speed / epsilon, 1e-7);
+        EXPECT_NEAR(box.state.velocity[along](i, j, k), through, 1e-7);
       });
     }
 }
