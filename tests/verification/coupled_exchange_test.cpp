@@ -38,10 +38,12 @@ struct Cloud {
                   .gravity = gravity,
                   .scheme = scheme},
                  timer),
-        dem(decomposition, dem_setup(), {LawTable<LinearSpringDashpot>{{{1, 0}}, {{1, 0}}}, LawTable<Frictionless>{{{}}, {{}}}, {}, {}}, timer) {
+        dem(decomposition, dem_setup(),
+            {LawTable<LinearSpringDashpot>{{{1, 0}}, {{1, 0}}}, LawTable<Frictionless>{{{}}, {{}}}, {}, {}}, timer) {
     ParticleStore cloud;
     for (int p = 0; p < 400; ++p) {  // on a skewed lattice, 2.4 diameters apart at least
-      const Vec3 place{0.003 + 0.0028 * (p % 6) + 1e-4 * (p % 7), 0.004 + 0.0028 * (p / 6 % 8), 0.001 + 0.0024 * (p / 48)};
+      const int row = p / 6 % 8, layer = p / 48;
+      const Vec3 place{0.003 + 0.0028 * (p % 6) + 1e-4 * (p % 7), 0.004 + 0.0028 * row, 0.001 + 0.0024 * layer};
       if (decomposition.owner(place) != decomposition.comm().rank()) continue;
       cloud.add(p, place, {0.1 * std::sin(p), 0.1 * std::cos(2 * p), 0.1 * std::sin(3 * p)}, {});
     }
@@ -50,7 +52,8 @@ struct Cloud {
     transfer.deposit_volume(dem.particles(), gas.fraction);
   }
   GasSetup gas_setup() const {
-    GasSetup setup{.density = 1.2, .viscosity = scene.viscosity, .gravity = gravity, .tolerance = 1e-5, .pressure_tolerance = 1e-4};
+    GasSetup setup{
+        .density = 1.2, .viscosity = scene.viscosity, .gravity = gravity, .tolerance = 1e-5, .pressure_tolerance = 1e-4};
     for (int d = 0; d < 2; ++d) setup.faces[d] = {NoSlip{}, NoSlip{}};
     return setup;
   }
