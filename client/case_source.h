@@ -13,8 +13,8 @@ namespace bedflow::client {
 // that the place has.
 void set_value(v1::Case& value, const std::string& assignment);
 
-// `where` is a file, "-" for stdin, the name of a ready case, or that and a preset, as in "mueller@mfix-exa-2018". Assignments are applied, then everything is checked:
-// throws Failure (usage) with all faults.
+// `where` is a file, "-" for stdin, the name of a ready case, or that and a preset, as in "mueller@mfix-exa-2018". Assignments
+// are applied, then everything is checked: throws Failure (usage) with all faults.
 v1::Case load_case(const std::string& where, const std::vector<std::string>& assignments = {});
 
 std::string ready_case_names();  // "mueller, goldschmidt, ..."

@@ -3,7 +3,8 @@
 //   ∂ε/∂t + ∇·(ε U) = 0
 //   ρg ε DU/Dt = −ε_b ∇p + ∇·σ + Σ b (V − U)/cell + ρg ε_b g,     σ = μ(∇U + ∇Uᵀ) − (2/3) μ (∇·U) I
 //
-// backward Euler. Along driven periodic directions ∇p is that of p less a constant fall. ε_b is the gas share of a face's cell as the particles' buoyancy leaves it (Exchange).
+// backward Euler. Along driven periodic directions ∇p is that of p less a constant fall. ε_b is the gas share of a face's cell as
+// the particles' buoyancy leaves it (Exchange).
 #pragma once
 
 #include <array>
@@ -31,8 +32,8 @@ struct GasSetup {
   std::array<std::array<Boundary, 2>, 3> faces{};  // [direction][low, high]; ignored where periodic
   std::array<Drive, 3> drive{};                    // along periodic directions
   std::vector<Panel> panels{};
-  Convection convection{};                         // the grid needs ghosts_of(convection) layers
-  double pressure_relaxation = 0.8;                // of SIMPLE, like the next three
+  Convection convection{};           // the grid needs ghosts_of(convection) layers
+  double pressure_relaxation = 0.8;  // of SIMPLE, like the next three
   double velocity_relaxation = 0.5;
   int min_iterations = 2;
   int max_iterations = 500;

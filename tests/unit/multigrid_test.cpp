@@ -151,8 +151,10 @@ TEST(Multigrid, TakesThinBedsAndAnyNumberOfCells) {
 // Every preconditioner finds the same x, down to what double precision leaves.
 TEST(ConjugateGradients, EveryPreconditionerFindsTheSolution) {
   for (const Kind& kind : kinds())
-    for (const Preconditioner choice : {Preconditioner::multigrid, Preconditioner::incomplete_cholesky, Preconditioner::unpreconditioned}) {
-      if (choice == Preconditioner::unpreconditioned && kind.drag >= 1e3) continue;  // does not get there in thousands of iterations
+    for (const Preconditioner choice :
+         {Preconditioner::multigrid, Preconditioner::incomplete_cholesky, Preconditioner::unpreconditioned}) {
+      if (choice == Preconditioner::unpreconditioned && kind.drag >= 1e3)
+        continue;  // does not get there in thousands of iterations
       PressureSystem system(kind, Comm::world());
       ConjugateGradients solver(system.decomposition, system.grid, system.halo, choice);
       solver.factor(system.matrix);

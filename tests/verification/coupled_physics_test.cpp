@@ -43,8 +43,10 @@ double fall_by_transfer(const DragScene& gas, double density, double gravity, do
   Exchange exchange(grid);
   const double volume = std::numbers::pi / 6 * cube(gas.diameter);
   Transfer transfer(decomposition, grid, halo, {.particle_volume = volume}, timer);
-  DemSetup setup{
-      .types = {{gas.diameter / 2, density, false}}, .gravity = {0, -gravity, 0}, .skin = 0.1 * gas.diameter, .gas = GasForce::frozen};
+  DemSetup setup{.types = {{gas.diameter / 2, density, false}},
+                 .gravity = {0, -gravity, 0},
+                 .skin = 0.1 * gas.diameter,
+                 .gas = GasForce::frozen};
   setup.sides[0] = setup.sides[2] = {Side::periodic, Side::periodic};
   Dem dem(decomposition, setup, {LawTable<LinearSpringDashpot>{{{1, 0}}, {{1, 0}}}, LawTable<Frictionless>{{{}}, {{}}}, {}, {}},
           timer);
