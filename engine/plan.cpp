@@ -4,11 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <numbers>
 #include <sstream>
 #include <utility>
 
+#include "base/short_number.h"
 #include "coupling/transfer.h"
 #include "plan_walls.h"
 
@@ -28,12 +27,6 @@ constexpr double projection_cell_seconds = 0.21e-6;
 // Below this many cells the many cheap iterations of incomplete Cholesky cost SIMPLE, which solves its pressure to a hundredth,
 // no more than the few of a multigrid (tests/performance/bench_gas.cpp); the projection goes to a millionth.
 constexpr std::int64_t smallest_multigrid = 20000;
-
-std::string number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.4g", value);
-  return text;
-}
 
 // The largest superficial velocity that any inflow or held flux of the scene reaches, m/s.
 double fastest_inflow(const GasScene& gas) {
@@ -56,7 +49,7 @@ double drag_limit(const Scene& scene) {
   const double slip = fastest_inflow(*scene.gas) / fraction;
   double limit = 0;
   for (const SeedKind& kind : scene.particles->kinds) {
-    const double d = kind.sizes.smallest(), mass = kind.density * std::numbers::pi / 6 * d * d * d;
+    const double d = kind.sizes.smallest(), mass = kind.density * sphere_volume(d);
     const DragScene drag{scene.gas->setup.density, scene.gas->setup.viscosity, d};
     const double b = std::visit([&](const auto& law) { return law(drag, slip, fraction); }, scene.coupling->drag);
     if (b > 0) limit = limit > 0 ? std::min(limit, 2 * mass / b) : 2 * mass / b;
@@ -76,8 +69,9 @@ void plan_time(Plan& plan) {
   plan.shortest_step = scene.shortest_step.value_or(plan.step / 1000);
   plan.steps = static_cast<std::int64_t>(std::ceil(scene.end_time / plan.step - 1e-9));
   if (plan.shortest_step > plan.step) {
-    throw Stop(Reason::invalid_case, "time.shortest_step = " + number(plan.shortest_step) + " s is longer than the gas step of " +
-                                         number(plan.step) + " s (time.step, or the collision time)");
+    throw Stop(Reason::invalid_case, "time.shortest_step = " + short_number(plan.shortest_step) +
+                                         " s is longer than the gas step of " + short_number(plan.step) +
+                                         " s (time.step, or the collision time)");
   }
 }
 
@@ -134,19 +128,19 @@ void plan_space(Plan& plan) {
       plan.ghosts =
           std::max(plan.ghosts, kernel_ghosts(scene.coupling->kernel, scene.particles->largest(), spacing, plan.skin, shared));
     }
-    const double reach = scene.particles->largest() + plan.skin;
+    const double reach = scene.particles->largest() + scene.particles->laws.range() + plan.skin;
     for (int d = 0; d < 3; ++d) {
       if (!scene.gas) plan.cells[d] = std::max(1, static_cast<int>(scene.size[d] / (2 * scene.particles->largest())));
       const double cell = scene.size[d] / plan.cells[d];
       if (plan.ranks > 1) plan.narrowest[d] = std::max(plan.ghosts, static_cast<int>(std::ceil(reach / cell)));
       if (scene.periodic[d] && scene.size[d] < 2 * reach) {
-        throw Stop(Reason::invalid_case, "domain.size: " + number(scene.size[d]) +
-                                             " m in a periodic direction is less than twice the " +
-                                             "reach of the particles (largest diameter + skin = " + number(reach) + " m)");
+        throw Stop(Reason::invalid_case,
+                   "domain.size: " + short_number(scene.size[d]) + " m in a periodic direction is less than twice the " +
+                       "reach of the particles (largest diameter + attraction + skin = " + short_number(reach) + " m)");
       }
       if (scene.gas && plan.skin / 2 > 0.4 * cell) {
-        throw Stop(Reason::invalid_case, "particles.skin = " + number(plan.skin) + " m is too wide for cells of " + number(cell) +
-                                             " m (domain.cells): at most 0.8 of a cell");
+        throw Stop(Reason::invalid_case, "particles.skin = " + short_number(plan.skin) + " m is too wide for cells of " +
+                                             short_number(cell) + " m (domain.cells): at most 0.8 of a cell");
       }
     }
   } else if (plan.ranks > 1) {
@@ -191,18 +185,18 @@ void plan_cost(Plan& plan) {
 void check_memory(Plan& plan) {
   const double here = static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGE_SIZE));
   if (plan.memory_bytes > here) {
-    plan.warnings.push_back("the scene needs about " + number(plan.memory_bytes / 1e9) + " GB, this machine has " +
-                            number(here / 1e9) + " GB: fewer cells (domain.cells) or particles, or a machine with more");
+    plan.warnings.push_back("the scene needs about " + short_number(plan.memory_bytes / 1e9) + " GB, this machine has " +
+                            short_number(here / 1e9) + " GB: fewer cells (domain.cells) or particles, or a machine with more");
   }
 }
 
 std::string kernel_text(const Scene& scene) {
   const std::string name = std::visit([](const auto& kernel) { return std::string(kernel.name); }, scene.coupling->kernel);
   if (const auto* dpvm = std::get_if<SquareDpvm>(&scene.coupling->kernel)) {
-    return name + ", " + number(dpvm->width) + " d wide" + (dpvm->caps ? ", shared by caps" : "");
+    return name + ", " + short_number(dpvm->width) + " d wide" + (dpvm->caps ? ", shared by caps" : "");
   }
   if (const auto* gaussian = std::get_if<Gaussian>(&scene.coupling->kernel)) {
-    return name + ", " + number(gaussian->width) + " d wide at half maximum";
+    return name + ", " + short_number(gaussian->width) + " d wide at half maximum";
   }
   return name + ", as wide as the cells";
 }
@@ -210,7 +204,7 @@ std::string kernel_text(const Scene& scene) {
 std::string sizes_text(const ParticleScene& particles) {
   double smallest = particles.largest();
   for (const SeedKind& kind : particles.kinds) smallest = std::min(smallest, kind.sizes.smallest());
-  return (smallest < particles.largest() ? number(smallest) + " to " : "") + number(particles.largest()) + " m";
+  return (smallest < particles.largest() ? short_number(smallest) + " to " : "") + short_number(particles.largest()) + " m";
 }
 
 void add_sizes(Plan& plan) {
@@ -281,14 +275,14 @@ void plan_parts(Plan& plan) {
     add("panels in the box", !setup.panels.empty(), std::to_string(setup.panels.size()) + " in the case");
     const bool limited = plan.longest_step > plan.step || scene.courant;
     add("adaptive step", limited,
-        limited ? "up to " + number(plan.longest_step) + " s" +
-                      (scene.courant ? ", Courant number at most " + number(*scene.courant) : "")
+        limited ? "up to " + short_number(plan.longest_step) + " s" +
+                      (scene.courant ? ", Courant number at most " + short_number(*scene.courant) : "")
                 : "cut by convergence only: neither time.longest_step nor time.courant is set");
   }
   add("messages between ranks", plan.ranks > 1, plan.ranks > 1 ? std::to_string(plan.ranks) + " ranks" : "one rank");
   add("monitors", !scene.monitors.empty(), std::to_string(scene.monitors.size()) + " in the case");
   add("plot files", scene.plot_interval.has_value(),
-      scene.plot_interval ? "every " + number(*scene.plot_interval) + " s" : "not asked for");
+      scene.plot_interval ? "every " + short_number(*scene.plot_interval) + " s" : "not asked for");
 }
 
 void check_coupling(Plan& plan) {
@@ -302,14 +296,14 @@ void check_coupling(Plan& plan) {
                  scene.coupling->scheme);
   if (plan.drag_limit > 0 && limited > plan.drag_limit) {
     const bool frozen = std::holds_alternative<Explicit>(scene.coupling->scheme);
-    throw Stop(Reason::invalid_case, "coupling." + name + " is unstable beyond 2m/b = " + number(plan.drag_limit) +
+    throw Stop(Reason::invalid_case, "coupling." + name + " is unstable beyond 2m/b = " + short_number(plan.drag_limit) +
                                          " s (mass of a particle over the heaviest drag in sight), the " +
-                                         (frozen ? "gas step" : "sub-step") + " is " + number(limited) +
+                                         (frozen ? "gas step" : "sub-step") + " is " + short_number(limited) +
                                          " s; choose coupling.semi_implicit, or " +
                                          (frozen ? "set time.step below that" : "more particles.steps_per_collision"));
   }
   if (plan.cell_ratio < 1.5 || plan.cell_ratio > 5) {
-    plan.warnings.push_back("cells of Δ* = " + number(plan.cell_ratio) + " diameters: about 2 is the field's rule");
+    plan.warnings.push_back("cells of Δ* = " + short_number(plan.cell_ratio) + " diameters: about 2 is the field's rule");
   }
 }
 
@@ -332,7 +326,7 @@ Plan make_plan(const Scene& scene, int ranks) {
     const double needed = monitor.averaging_start + monitor.averaging_bin * monitor.averaging_bins;
     if (monitor.averaging_bin > 0 && needed > scene.end_time * (1 + 1e-9)) {
       plan.warnings.push_back("monitor " + monitor.name + " asks for " + std::to_string(monitor.averaging_bins) + " bins until " +
-                              number(needed) + " s, the run ends at " + number(scene.end_time) + " s");
+                              short_number(needed) + " s, the run ends at " + short_number(scene.end_time) + " s");
     }
   }
   return plan;
@@ -351,26 +345,27 @@ std::string Plan::text() const {
     out << (item.on ? "  on   " : "  off  ") << item.part << std::string(seen < 29 ? 29 - seen : 1, ' ') << item.why << "\n";
   }
   if (scene.particles) {
-    line("collision time tau", number(scene.particles->collision_time) + " s");
-    line("sub-step dt_DEM", number(substep) + " s, " + std::to_string(substeps) + " a step");
-    line("skin of the pair list", number(skin) + (tuned_skin ? " m at the start, then tuned" : " m"));
+    line("collision time tau", short_number(scene.particles->collision_time) + " s");
+    line("sub-step dt_DEM", short_number(substep) + " s, " + std::to_string(substeps) + " a step");
+    line("skin of the pair list", short_number(skin) + (tuned_skin ? " m at the start, then tuned" : " m"));
     for (const SeedKind& kind : scene.particles->kinds) {
       if (kind.sizes.constant()) continue;
-      line("sizes of " + kind.name, number(kind.sizes.smallest()) + " to " + number(kind.sizes.largest()) + " m, mean " +
-                                        number(kind.sizes.mean()) + " m, d32 " + number(kind.sizes.sauter()) + " m");
+      line("sizes of " + kind.name, short_number(kind.sizes.smallest()) + " to " + short_number(kind.sizes.largest()) +
+                                        " m, mean " + short_number(kind.sizes.mean()) + " m, d32 " +
+                                        short_number(kind.sizes.sauter()) + " m");
     }
   }
-  line(scene.gas ? "gas step dt_CFD" : "step", number(step) + " s, not below " + number(shortest_step) + " s");
+  line(scene.gas ? "gas step dt_CFD" : "step", short_number(step) + " s, not below " + short_number(shortest_step) + " s");
   if (corners.size() > 1) line("instants that steps end on", std::to_string(corners.size() - 1) + " before the end");
-  if (cell_ratio > 0) line("cell over particle size", number(cell_ratio) + " (Δ*)");
+  if (cell_ratio > 0) line("cell over particle size", short_number(cell_ratio) + " (Δ*)");
   if (drag_limit > 0)
-    line("2m/b of the heaviest drag", number(drag_limit) + " s, " + number(drag_limit / step) + " times the step");
-  line("steps", std::to_string(steps) + " to " + number(scene.end_time) + " s");
+    line("2m/b of the heaviest drag", short_number(drag_limit) + " s, " + short_number(drag_limit / step) + " times the step");
+  line("steps", std::to_string(steps) + " to " + short_number(scene.end_time) + " s");
   line("cells", std::to_string(cell_count));
   line("particles", std::to_string(particle_count));
-  line("memory", number(memory_bytes / 1e6) + " MB");
-  line("checkpoint", number(checkpoint_bytes / 1e6) + " MB");
-  line("estimated wall time", number(seconds) + " s");
+  line("memory", short_number(memory_bytes / 1e6) + " MB");
+  line("checkpoint", short_number(checkpoint_bytes / 1e6) + " MB");
+  line("estimated wall time", short_number(seconds) + " s");
   for (const std::string& warning : warnings) out << "  warning: " << warning << "\n";
   return out.str();
 }

@@ -43,7 +43,8 @@ const char* motion_text(const Motion& motion) {
 
 class Check {
  public:
-  Check(const Scene& scene, double skin, double substep) : scene_(scene), reach_(skin), substep_(substep) {
+  Check(const Scene& scene, double skin, double substep)
+      : scene_(scene), reach_(skin + scene.particles->laws.range()), substep_(substep) {
     double largest = 0;
     for (const ParticleType& type : scene.particles->types) {
       largest = std::max(largest, type.radius);

@@ -18,7 +18,7 @@ void write_plot_files(const Comm& comm, const std::filesystem::path& folder, con
     std::vector<double> speed(n), diameter(n);
     for (std::size_t p = 0; p < n; ++p) {
       speed[p] = norm(store.velocity(p));
-      diameter[p] = 2 * radius_of(dem->setup(), store, p);
+      diameter[p] = 2 * radius_of(dem->setup().types, store, p);
     }
     std::vector<PlotArray> arrays{
         {"id", "", std::vector<std::int64_t>(store.id.begin(), store.id.begin() + static_cast<std::ptrdiff_t>(n))},

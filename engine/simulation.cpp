@@ -2,21 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <numbers>
 #include <utility>
 
+#include "base/short_number.h"
 #include "grid/rows.h"
 
 namespace bedflow {
 
 namespace {
-
-std::string number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.4g", value);
-  return text;
-}
 
 DemSetup dem_setup(const Plan& plan) {
   const ParticleScene& particles = *plan.scene.particles;
@@ -65,7 +58,7 @@ Simulation::CouplingPart::CouplingPart(const Decomposition& decomposition, const
       transfer(decomposition, gas.grid, gas.halo,
                {.kernel = plan.scene.coupling->kernel,
                 .diameter = plan.scene.particles->largest(),
-                .particle_volume = std::numbers::pi / 6 * std::pow(plan.scene.particles->largest(), 3),
+                .particle_volume = sphere_volume(plan.scene.particles->largest()),
                 .mass = plan.scene.particles->types.front().mass(),
                 .gravity = plan.scene.gravity,
                 .fraction_floor = plan.scene.coupling->fraction_floor,
@@ -145,12 +138,12 @@ StepLimit Simulation::step_limit() const {
   if (scene.courant) {
     const double rate = decomposition_.comm().max(fastest_transport(gas_->grid, gas_->state.velocity));
     if (rate > 0) {
-      limit = {*scene.courant / rate, "the Courant number must stay below time.courant = " + number(*scene.courant)};
+      limit = {*scene.courant / rate, "the Courant number must stay below time.courant = " + short_number(*scene.courant)};
     }
   }
   if (coupling_ && std::holds_alternative<Explicit>(scene.coupling->scheme) && plan_.longest_step > plan_.step) {
     const double rate = decomposition_.comm().max(coupling_->transfer.fastest_response()), most = 1 / rate;
-    if (rate > 0 && most < limit.longest) limit = {most, "the drag of the particles allows m/b = " + number(most) + " s"};
+    if (rate > 0 && most < limit.longest) limit = {most, "the drag of the particles allows m/b = " + short_number(most) + " s"};
   }
   return limit;
 }
@@ -273,7 +266,7 @@ Observation Simulation::observation() {
   now.momentum_residual = exchange_residual_;
   if (dem_) {
     now.particles = &dem_->particles();
-    now.types = &dem_->setup();
+    now.types = &dem_->setup().types;
     now.mass_entered = turnover_.entered.mass;
     now.mass_left = turnover_.left.mass;
     now.max_overlap = max_overlap_;

@@ -1,4 +1,4 @@
-// One coupled step, and the only std::visit over laws.
+// One coupled step. The laws of gas and coupling are visited here, those of contacts in particles/forces.h.
 #pragma once
 
 #include <memory>

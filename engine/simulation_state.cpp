@@ -109,7 +109,7 @@ void Simulation::put_particles(CheckpointContent& content) const {
     content.numbers["particles/skin_rebuilds"] = static_cast<double>(tuning.counts.rebuilds);
   }
   Vec3 momentum;
-  for (std::size_t p = 0; p < n; ++p) momentum += mass_of(setup, store, p) * store.velocity(p);
+  for (std::size_t p = 0; p < n; ++p) momentum += mass_of(setup.types, store, p) * store.velocity(p);
   for (int d = 0; d < 3; ++d) {
     content.numbers[std::string("particles/total_momentum_") + "xyz"[d]] = decomposition_.comm().sum(momentum[d]);
   }
@@ -130,7 +130,7 @@ void Simulation::put_particles(CheckpointContent& content) const {
   if (setup.types.size() > 1) integers("particles/type", "place among the case's types", store.type);
   if (setup.types.size() > 1 || setup.distributed()) {
     std::vector<double> radii(n);
-    for (std::size_t p = 0; p < n; ++p) radii[p] = radius_of(setup, store, p);
+    for (std::size_t p = 0; p < n; ++p) radii[p] = radius_of(setup.types, store, p);
     content.arrays.push_back({"particles/radius", "m", "radii", std::move(radii), std::nullopt, 1});
   }
   content.arrays.push_back(rows("particles/position_at_rebuild", "m",
@@ -138,9 +138,16 @@ void Simulation::put_particles(CheckpointContent& content) const {
                                 dem_->positions_at_rebuild()));
   if (setup.verlet) {
     std::vector<Vec3> forces(n), torques(n);
-    for (std::size_t p = 0; p < n; ++p) forces[p] = store.previous[p].force, torques[p] = store.previous[p].torque();
+    std::vector<double> known(n);
+    for (std::size_t p = 0; p < n; ++p) {
+      forces[p] = store.previous[p].force;
+      torques[p] = store.previous[p].torque();
+      known[p] = store.previous[p].known;
+    }
     content.arrays.push_back(rows("particles/contact_force", "N", "by contacts in the last sub-step", forces));
     content.arrays.push_back(rows("particles/contact_torque", "N m", "by contacts in the last sub-step", torques));
+    content.arrays.push_back(
+        {"particles/contact_known", "1", "0: the particle has made no sub-step", std::move(known), std::nullopt, 1});
   }
 }
 
@@ -233,25 +240,26 @@ void Simulation::restore_particles(const CheckpointReader& from) {
       for (std::size_t p = 0; p < store.owned; ++p) store.gas_response[p].debt = debts[p];
     }
   }
-  if (dem_->setup().verlet && from.has("particles/contact_force")) {
+  if (setup.verlet && from.has("particles/contact_force")) {
     const std::vector<Vec3> forces = vectors(from.rows("particles/contact_force"));
     const std::vector<Vec3> torques = vectors(from.rows("particles/contact_torque"));
+    const std::vector<double> known = from.rows("particles/contact_known");
     store.previous.resize(store.owned);
     for (std::size_t p = 0; p < store.owned; ++p) {
       store.previous[p].add(forces[p], torques[p]);
-      store.previous[p].known = 1;
+      store.previous[p].known = known[p];
     }
   }
   std::vector<Vec3> at_rebuild;
   if (same_ranks) at_rebuild = vectors(from.rows("particles/position_at_rebuild"));
   if (!same_ranks) {
-    store.each_array(dem_->setup(), [&](auto& array) { array.resize(store.owned); });
-    store = redistribute(decomposition_, dem_->setup(), std::move(store));
+    store.each_array(setup, [&](auto& array) { array.resize(store.owned); });
+    store = redistribute(decomposition_, setup, std::move(store));
   }
 
   std::vector<PairHistory> pairs;
   std::vector<WallHistory> walls;
-  if ((dem_->setup().history || dem_->setup().rolling_history) && from.has("contacts/pair")) {
+  if ((setup.history || setup.rolling_history) && from.has("contacts/pair")) {
     const std::vector<std::int64_t> pair_ids = from.integer_rows("contacts/pair"), wall_ids = from.integer_rows("contacts/wall");
     const std::vector<Vec3> pair_displacements = vectors(from.rows("contacts/pair_displacement"));
     const std::vector<Vec3> pair_angles = vectors(from.rows("contacts/pair_angle"));

@@ -38,7 +38,7 @@ void Simulation::turn_over_particles(double dt) {
 Amount Simulation::amount_here() const {
   const ParticleStore& store = dem_->particles();
   Amount here;
-  for (std::size_t p = 0; p < store.owned; ++p) here.add(mass_of(dem_->setup(), store, p));
+  for (std::size_t p = 0; p < store.owned; ++p) here.add(mass_of(dem_->setup().types, store, p));
   return here;
 }
 
@@ -55,7 +55,7 @@ std::vector<SizeMoments> Simulation::size_moments() const {
   for (const ParticleType& type : setup.types) sums.emplace_back(2 * type.radius);
   const ParticleStore& store = dem_->particles();
   for (std::size_t p = 0; p < store.owned; ++p)
-    sums[store.type.empty() ? 0 : store.type[p]].add(2 * radius_of(setup, store, p), mass_of(setup, store, p));
+    sums[store.type.empty() ? 0 : store.type[p]].add(2 * radius_of(setup.types, store, p), mass_of(setup.types, store, p));
   std::vector<SizeMoments> moments;
   moments.reserve(sums.size());
   for (const SizeSums& of_type : sums) moments.push_back(of_type.over_all(decomposition_.comm()));

@@ -1,7 +1,8 @@
 #include "step_controller.h"
 
 #include <algorithm>
-#include <cstdio>
+
+#include "base/short_number.h"
 
 namespace bedflow {
 
@@ -10,12 +11,6 @@ namespace {
 constexpr double less = 0.9;             // a cut, and the inverse of a growth
 constexpr int steps_before_growth = 10;  // converged ones
 constexpr double same = 1e-9;            // of a step: times nearer than that are one
-
-std::string number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.4g", value);
-  return text;
-}
 
 }  // namespace
 
@@ -29,10 +24,11 @@ void StepController::restore(double size, int good_steps) {
 
 std::string StepController::shorten(double to, double time, const std::string& reason) {
   if (to < shortest_) {
-    throw Stop(Reason::not_converged, "the gas needs a step below time.shortest_step = " + number(shortest_) +
-                                          " s at t = " + number(time) + " s, where dt is " + number(size_) + " s: " + reason);
+    throw Stop(Reason::not_converged, "the gas needs a step below time.shortest_step = " + short_number(shortest_) +
+                                          " s at t = " + short_number(time) + " s, where dt is " + short_number(size_) +
+                                          " s: " + reason);
   }
-  std::string note = "dt cut from " + number(size_) + " to " + number(to) + " s: " + reason;
+  std::string note = "dt cut from " + short_number(size_) + " to " + short_number(to) + " s: " + reason;
   size_ = to;
   good_steps_ = 0;
   return note;
@@ -58,7 +54,7 @@ std::string StepController::converged() {
   if (grown > limit_) return {};
   size_ = grown;
   good_steps_ = 0;
-  return "dt grows to " + number(size_) + " s: " + std::to_string(steps_before_growth) + " steps have converged";
+  return "dt grows to " + short_number(size_) + " s: " + std::to_string(steps_before_growth) + " steps have converged";
 }
 
 double StepController::corner_after(double time) const {

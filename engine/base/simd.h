@@ -95,13 +95,6 @@ double largest(P value) {
   for (int l = 1; l < lanes_of<P>; ++l) result = max(result, value[l]);
   return result;
 }
-template <PackLike P>
-P lane_numbers() {
-  P result;
-  for (int l = 0; l < lanes_of<P>; ++l) result[l] = l;
-  return result;
-}
-
 // Bit l is set where lane l of a comparison holds.
 template <class Mask>
 unsigned bits_of(Mask mask) {
@@ -215,8 +208,6 @@ void rows_of_eight(std::array<Pack<lanes>, 8> columns, Take take) {
 
 // Rows of 4 doubles, one a lane, as 4 columns; and back for the first `count` lanes. row(l, part) is the part of row l that
 // starts at its double part; to(l) points to row l.
-template <int lanes>
-using Quarter = Pack < lanes<4 ? lanes : 4>;
 template <int lanes, class Row>
 std::array<Pack<lanes>, 4> columns_of_four(Row row) {
   std::array<Pack<lanes>, 4> columns;

@@ -6,16 +6,13 @@
 
 #include "case/contact_scene.h"
 #include "case/seeding_scene.h"
+#include "case/vector.h"
 #include "case/wall_scene.h"
 #include "case_file.h"
 
 namespace bedflow {
 
 namespace {
-
-Vec3 vec(const v1::Vector& v) {
-  return {v.x(), v.y(), v.z()};
-}
 
 // ---- gas
 

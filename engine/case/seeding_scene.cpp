@@ -3,13 +3,11 @@
 #include <algorithm>
 #include <limits>
 
+#include "case/vector.h"
+
 namespace bedflow {
 
 namespace {
-
-Vec3 vec(const v1::Vector& v) {
-  return {v.x(), v.y(), v.z()};
-}
 
 std::vector<SizeClass> classes(const google::protobuf::RepeatedPtrField<v1::SizeClass>& from) {
   std::vector<SizeClass> result;

@@ -1,14 +1,12 @@
 #include "case/wall_scene.h"
 
+#include "case/vector.h"
 #include "geometry/cut_cells.h"
 
 namespace bedflow {
 
 namespace {
 
-Vec3 vec(const v1::Vector& v) {
-  return {v.x(), v.y(), v.z()};
-}
 Vec3 direction(const v1::Vector& v) {
   const Vec3 any = vec(v);
   return 1 / norm(any) * any;

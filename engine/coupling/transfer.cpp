@@ -65,11 +65,9 @@ void Transfer::find_sizes(const ParticleStore& particles) {
   sizes_.volume.assign(count, setup_.particle_volume);
   sizes_.mass.assign(count, setup_.mass);
   for (std::size_t p = 0; p < count && !alike; ++p) {
-    const ParticleType& type = setup_.types[particles.type.empty() ? 0 : particles.type[p]];
-    const double radius = particles.radius.empty() ? type.radius : particles.radius[p];
-    sizes_.diameter[p] = 2 * radius;
-    sizes_.mass[p] = type.mass_of(radius);
-    sizes_.volume[p] = sizes_.mass[p] / type.density;
+    sizes_.diameter[p] = 2 * radius_of(setup_.types, particles, p);
+    sizes_.mass[p] = mass_of(setup_.types, particles, p);
+    sizes_.volume[p] = sphere_volume(sizes_.diameter[p]);
   }
 }
 

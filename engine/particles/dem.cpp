@@ -54,10 +54,10 @@ Dem::Dem(const Decomposition& decomposition, const DemSetup& setup, ContactLaws 
       laws_(std::move(laws)),
       timer_(timer),
       faces_(box_faces(decomposition.size())),
-      ghosts_(decomposition, reach() - setup.skin + std::max(setup.skin, setup.widest_skin)),
+      ghosts_(decomposition, reach_with(std::max(setup.skin, setup.widest_skin))),
       cells_(setup.types.size()),
       tuner_(2 * setup.largest_radius(), setup.widest_skin),
-      walls_(std::move(walls), decomposition.size(), reach() - setup.skin + std::max(setup.skin, setup.widest_skin)),
+      walls_(std::move(walls), decomposition.size(), reach_with(std::max(setup.skin, setup.widest_skin))),
       loads_(faces_.size() + walls_.size()) {
   ghosts_.set_reach(reach());
 }
@@ -76,7 +76,7 @@ void Dem::drop_ghosts() {
   if (setup_.gas == GasForce::none) particles_.gas_force.clear();
   if (setup_.gas != GasForce::relaxed) particles_.gas_response.clear();
   if (setup_.distributed())
-    for (std::size_t i = given; i < particles_.owned; ++i) particles_.radius[i] = type_of(setup_, particles_, i).radius;
+    for (std::size_t i = given; i < particles_.owned; ++i) particles_.radius[i] = type_of(setup_.types, particles_, i).radius;
 }
 
 // Chooses the ghosts anew, by the places of the owned particles.

@@ -84,7 +84,8 @@ class Dem {
                const std::vector<WallHistory>& walls);
 
  private:
-  double reach() const { return 2 * setup_.largest_radius() + setup_.range + setup_.skin; }
+  double reach_with(double skin) const { return 2 * setup_.largest_radius() + setup_.range + skin; }
+  double reach() const { return reach_with(setup_.skin); }
   void drop_ghosts();
   void take_ghosts();
   void forward_ghosts();

@@ -98,7 +98,7 @@ double Dem::take_max_overlap() {
 double Dem::kinetic_energy() const {
   double energy = 0;
   for (std::size_t i = 0; i < particles_.owned; ++i) {
-    const double mass = mass_of(setup_, particles_, i), inertia = inertia_of(mass, radius_of(setup_, particles_, i));
+    const double mass = mass_of(setup_.types, particles_, i), inertia = inertia_of(mass, radius_of(setup_.types, particles_, i));
     const Vec3 v = particles_.velocity(i), spin = particles_.spin(i);
     energy += 0.5 * (mass * dot(v, v) + inertia * dot(spin, spin));
   }

@@ -24,8 +24,7 @@ double uniform(std::uint64_t seed, std::uint64_t n) {
 
 double mean_mass(const std::vector<SeedKind>& kinds, const Inlet& inlet) {
   double mass = 0;
-  for (std::size_t k = 0; k < kinds.size(); ++k)
-    mass += inlet.shares[k] * kinds[k].density * std::numbers::pi / 6 * kinds[k].sizes.moment(3);
+  for (std::size_t k = 0; k < kinds.size(); ++k) mass += inlet.shares[k] * kinds[k].density * kinds[k].mean_volume();
   return mass;
 }
 
@@ -142,7 +141,7 @@ std::vector<double> Insertion::blocked(const std::vector<PlacedSphere>& batch, c
   for (std::size_t i = 0; i < particles.owned; ++i) {
     const Vec3 x = particles.position(i);
     if (!beside(x)) continue;
-    const double radius = radius_of(setup_, particles, i);
+    const double radius = radius_of(setup_.types, particles, i);
     for (std::size_t t = 0; t < tries.size(); ++t)
       if (overlap(x, tries[t], radius + batch[t / tries_a_step].diameter / 2)) result[t] = 1;
   }

@@ -7,8 +7,8 @@
 // exactly G dt. Second order also with dashpots. A particle carries V*.
 //
 // A relaxed force of the gas, G − b V, takes V towards where it balances all other forces, exactly so for constant b and G:
-//   V' = V + (1 − e^−z)/z dt A,   z = b dt/m,   A the acceleration at the start;   the gas gives m (V' − V) − dt (contacts + m
-//   g).
+//   V' = V + (1 − e^−z)/z dt A,   z = b dt/m,   A the acceleration at the start;   the gas gives
+//   m (V' − V) − dt (contacts + m g).
 // It goes with symplectic Euler.
 #pragma once
 

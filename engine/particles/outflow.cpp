@@ -15,7 +15,7 @@ Amount take_departed_particles(Vec3 size, const DemSetup& setup, ParticleStore& 
   std::size_t kept = 0;
   for (std::size_t i = 0; i < particles.owned; ++i) {
     if (departed(particles.position(i))) {
-      gone.add(mass_of(setup, particles, i));
+      gone.add(mass_of(setup.types, particles, i));
       continue;
     }
     if (kept < i) {

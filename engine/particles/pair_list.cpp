@@ -20,14 +20,14 @@ void PairList::build(const std::vector<Cells>& cells, const DemSetup& setup, con
   pairs.clear();
   const auto add = [&](Vec3 from, Vec3 to, std::uint32_t i, std::uint32_t j) {
     const Vec3 apart = to - from;
-    const double reach = one_size ? widest : radius_of(setup, particles, i) + radius_of(setup, particles, j) + extra;
+    const double reach = one_size ? widest : radius_of(setup.types, particles, i) + radius_of(setup.types, particles, j) + extra;
     if (dot(apart, apart) >= reach * reach) return;
     const std::size_t type_i = type_at(particles, i), type_j = type_at(particles, j);
     const bool in_order = type_i != type_j ? type_i < type_j : particles.id[i] < particles.id[j];
     pairs.push_back(in_order ? Pair{i, j} : Pair{j, i});
   };
   const auto meet = [&](Vec3 place, std::uint32_t i, std::size_t other) {
-    const double reach = radius_of(setup, particles, i) + setup.types[other].radius + extra;
+    const double reach = radius_of(setup.types, particles, i) + setup.types[other].radius + extra;
     cells[other].around(place, reach, [&](std::uint32_t first, std::uint32_t last) {
       for (std::uint32_t j = first; j < last; ++j) add(place, places[j], i, j);
     });
@@ -86,7 +86,7 @@ void PairList::build_near(const DemSetup& setup, const std::array<Plane, 6>& fac
     const Side side = setup.sides[face / 2][face % 2];
     if (side == Side::periodic || side == Side::outlet) continue;
     for (std::size_t i = 0; i < places.size(); ++i) {
-      const double reach = 0.5 * setup.skin + (side == Side::wall ? radius_of(setup, particles, i) : 0);
+      const double reach = 0.5 * setup.skin + (side == Side::wall ? radius_of(setup.types, particles, i) : 0);
       if (faces[face].distance(places[i]) < reach) near.push_back({static_cast<std::uint32_t>(i), face});
     }
   }
@@ -109,6 +109,7 @@ void PairList::load(const ParticleStore& particles, double now, const ContactHis
     if (!rows.displacement.empty()) rows.displacement[i] = {memory.displacement, now};
     if (!rows.angle.empty()) rows.angle[i] = {memory.angle, now};
   };
+  if (pair_memory.displacement.empty() && pair_memory.angle.empty()) return;
   for (std::size_t p = 0; p < count(); ++p) {
     const auto [first, second] = pairs[p];
     if (first < particles.owned) {

@@ -2,8 +2,8 @@
 // sizes: what a scene does not need is not in the loop.
 //
 //   n = (Xj − Xi)/|Xj − Xi|,  δ = ri + rj − |Xj − Xi|,  ℓi = (|Xj − Xi|² + ri² − rj²)/(2|Xj − Xi|),  ℓj = |Xj − Xi| − ℓi
-//   Vij = Vi − Vj + (ℓi ωi + ℓj ωj) × n,  F_i = −F_j = −F_n n + F_t,  T_i = ℓi n × F_t,  T_j = ℓj n × F_t   (Cundall & Strack
-//   1979)
+//   Vij = Vi − Vj + (ℓi ωi + ℓj ωj) × n,  F_i = −F_j = −F_n n + F_t,  T_i = ℓi n × F_t,  T_j = ℓj n × F_t
+// (Cundall & Strack 1979)
 //
 // A register full of pairs at a time. The pairs of the list that touch are found first, without branches, and gathered in a short
 // buffer; about every second one does. A pair is then two row loads and one multiply-add (Xj − Xi, Vj − Vi, ωi + ωj), transposed
@@ -44,8 +44,8 @@ struct TwoSizes {
 };
 struct ManySizes {
   static constexpr bool equal = false, distributed = true;
-  const double* radius;        // of each row
-  double mass_per_volume3[2];  // mass over r³ of the two types
+  const double* radius;     // of each row
+  double mass_per_cube[2];  // mass over r³ of the two types
 };
 
 // Radii and masses of the pairs in a register.
@@ -68,7 +68,7 @@ PairSizes<Pack<lanes>> sizes_of(const Sizes& sizes, const PairList::Pair* pairs)
       result.radius[1][l] = sizes.radius[pairs[l].second];
     }
     for (int side = 0; side < 2; ++side)
-      result.mass[side] = sizes.mass_per_volume3[side] * result.radius[side] * result.radius[side] * result.radius[side];
+      result.mass[side] = sizes.mass_per_cube[side] * result.radius[side] * result.radius[side] * result.radius[side];
   } else if constexpr (Sizes::equal) {
     for (int side = 0; side < 2; ++side)
       result.radius[side] = broadcast<Real>(sizes.radius), result.mass[side] = broadcast<Real>(sizes.mass);
@@ -175,20 +175,25 @@ struct SweepResult {
   std::int64_t contacts = 0;  // touching pairs, a pair across ranks at the owner of its first row
 };
 
-// The memory of `count` contacts at places[…] of the rows: 0 for those that did not touch in the sub-step before.
-template <int lanes>
-Vector3<Pack<lanes>> recall(const MemoryRow* rows, const std::uint64_t* places, double now) {
-  const auto columns =
-      columns_of_four<lanes>([&](int l, int part) { return load<std::min(lanes, 4)>(&rows[places[l]].value.x + part); });
-  const auto known = columns[3] == now - 1;
-  Vector3<Pack<lanes>> result;
-  for (int d = 0; d < 3; ++d) result[d] = select(known, columns[d], Pack<lanes>{});
-  return result;
-}
-template <int lanes>
-void remember(MemoryRow* rows, const std::uint64_t* places, int count, const Vector3<Pack<lanes>>& value, double now) {
-  rows_of_four<lanes>({value.x, value.y, value.z, broadcast<Pack<lanes>>(now)}, count,
-                      [&](int l) { return &rows[places[l]].value.x; });
+// What the law says of `count` contacts, those at places[…] of `rows` where it has a memory: 0 for one that did not touch in the
+// sub-step before.
+template <int lanes, class Law, class Contact>
+Vector3<Pack<lanes>> with_memory(const Law& law, const Contact& contact, std::vector<MemoryRow>& rows,
+                                 const std::uint64_t* places, int count, double now) {
+  if constexpr (!Law::history) {
+    return law(contact);
+  } else {
+    MemoryRow* const row = rows.data();
+    const auto columns =
+        columns_of_four<lanes>([&](int l, int part) { return load<std::min(lanes, 4)>(&row[places[l]].value.x + part); });
+    const auto known = columns[3] == now - 1;
+    Vector3<Pack<lanes>> memory;
+    for (int d = 0; d < 3; ++d) memory[d] = select(known, columns[d], Pack<lanes>{});
+    const Vector3<Pack<lanes>> result = law(contact, memory);
+    rows_of_four<lanes>({memory.x, memory.y, memory.z, broadcast<Pack<lanes>>(now)}, count,
+                        [&](int l) { return &row[places[l]].value.x; });
+    return result;
+  }
 }
 
 // ---------------------------------------------------------------------------------------------------- sweeps
@@ -249,14 +254,8 @@ template <int lanes, bool with_ghost, class Sizes, class Contact, class Tangenti
           }
           const Vector3<Real> slip = c.velocity - c.touching.approach * c.n + cross(turn, c.n);
           const Sliding<Real> sliding{c.n, slip, abs(normal), 2.0 / 7 * c.touching.mass, bodies.dt, c.touching};
-          Vector3<Real> friction;
-          if constexpr (Tangential::history) {
-            Vector3<Real> displacement = recall<lanes>(list.pair_memory.displacement.data(), places, bodies.now);
-            friction = tangential(sliding, displacement);
-            remember<lanes>(list.pair_memory.displacement.data(), places, count, displacement, bodies.now);
-          } else {
-            friction = tangential(sliding);
-          }
+          const Vector3<Real> friction =
+              with_memory<lanes>(tangential, sliding, list.pair_memory.displacement, places, count, bodies.now);
           force += friction;
           torque = arm * cross(c.n, friction);
         }
@@ -276,28 +275,21 @@ template <int lanes, bool with_ghost, class Sizes, class Contact, class Rolling>
 [[gnu::flatten]] void sweep_rolling(PairList& list, std::size_t first, std::size_t last, const Bodies bodies, const Sizes sizes,
                                     const Contact contact, const Rolling rolling) {
   using Real = Pack<lanes>;
-  each_near_pair<lanes, with_ghost>(list, first, last, bodies, sizes, 0,
-                                    [&](const PairList::Pair* pairs, const std::uint64_t* places, int count) {
-                                      const PairContact<lanes> c = contact_of<lanes, with_ghost>(bodies, sizes, pairs);
-                                      const Vector3<Real> relative = spin_difference<lanes>(bodies, pairs);
-                                      const Real inertia_i = 0.4 * c.size.mass[0] * c.size.radius[0] * c.size.radius[0],
-                                                 inertia_j = 0.4 * c.size.mass[1] * c.size.radius[1] * c.size.radius[1];
-                                      const RollingContact<Real> rolls{c.n,
-                                                                       relative - dot(relative, c.n) * c.n,
-                                                                       abs(contact(c.touching)),
-                                                                       inertia_i * inertia_j / (inertia_i + inertia_j),
-                                                                       bodies.dt,
-                                                                       c.touching};
-                                      Vector3<Real> torque;
-                                      if constexpr (Rolling::history) {
-                                        Vector3<Real> angle = recall<lanes>(list.pair_memory.angle.data(), places, bodies.now);
-                                        torque = rolling(rolls, angle);
-                                        remember<lanes>(list.pair_memory.angle.data(), places, count, angle, bodies.now);
-                                      } else {
-                                        torque = rolling(rolls);
-                                      }
-                                      add_to_rows<lanes, with_ghost>(bodies, pairs, count, {}, torque, broadcast<Real>(-1));
-                                    });
+  each_near_pair<lanes, with_ghost>(
+      list, first, last, bodies, sizes, 0, [&](const PairList::Pair* pairs, const std::uint64_t* places, int count) {
+        const PairContact<lanes> c = contact_of<lanes, with_ghost>(bodies, sizes, pairs);
+        const Vector3<Real> relative = spin_difference<lanes>(bodies, pairs);
+        const Real inertia_i = 0.4 * c.size.mass[0] * c.size.radius[0] * c.size.radius[0],
+                   inertia_j = 0.4 * c.size.mass[1] * c.size.radius[1] * c.size.radius[1];
+        const RollingContact<Real> rolls{c.n,
+                                         relative - dot(relative, c.n) * c.n,
+                                         abs(contact(c.touching)),
+                                         inertia_i * inertia_j / (inertia_i + inertia_j),
+                                         bodies.dt,
+                                         c.touching};
+        const Vector3<Real> torque = with_memory<lanes>(rolling, rolls, list.pair_memory.angle, places, count, bodies.now);
+        add_to_rows<lanes, with_ghost>(bodies, pairs, count, {}, torque, broadcast<Real>(-1));
+      });
 }
 
 // Attraction of the pairs in [first, last) of the list.

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <numeric>
 #include <sstream>
 
@@ -19,12 +18,6 @@ constexpr double closest_regions =
     0.9;                             // spheres of two regions, in the sum of their radii: slight overlaps are preloaded contacts
 constexpr double round_off = 1e-12;  // of a division: spheres that just touch are allowed
 
-double volume(double diameter) {
-  return std::numbers::pi / 6 * diameter * diameter * diameter;
-}
-double mean_volume(const SeedKind& kind) {
-  return std::numbers::pi / 6 * kind.sizes.moment(3);
-}
 double box_volume(Vec3 low, Vec3 high) {
   const Vec3 edges = high - low;
   return edges.x * edges.y * edges.z;
@@ -37,7 +30,7 @@ std::vector<double> shares_of(const std::vector<SeedKind>& kinds, const std::vec
 // Volume of the solids of each kind, m³.
 std::vector<double> volumes_wanted(const std::vector<SeedKind>& kinds, const RandomSeeds& seeds) {
   std::vector<double> volumes = shares_of(kinds, seeds.shares);
-  for (std::size_t k = 0; k < kinds.size(); ++k) volumes[k] *= mean_volume(kinds[k]);
+  for (std::size_t k = 0; k < kinds.size(); ++k) volumes[k] *= kinds[k].mean_volume();
   const double all = std::accumulate(volumes.begin(), volumes.end(), 0.0);
   for (double& v : volumes) v *= seeds.solids_fraction * box_volume(seeds.low, seeds.high) / all;
   return volumes;
@@ -82,8 +75,8 @@ Spheres draw_volume(const std::vector<SeedKind>& kinds, const RandomSeeds& seeds
   for (std::size_t k = 0; k < kinds.size(); ++k)
     for (double filled = 0;;) {
       const double diameter = draw(kinds[k].sizes, random);
-      if (filled + volume(diameter) / 2 > wanted[k]) break;
-      filled += volume(diameter);
+      if (filled + sphere_volume(diameter) / 2 > wanted[k]) break;
+      filled += sphere_volume(diameter);
       spheres.push_back({.kind = static_cast<int>(k), .diameter = diameter});
     }
   return spheres;
@@ -94,7 +87,7 @@ Spheres draw_volume(const std::vector<SeedKind>& kinds, const RandomSeeds& seeds
 [[noreturn]] void refuse_region(const std::string& path, const RandomSeeds& seeds, const Spheres& spheres, std::size_t placed) {
   const Vec3 edges = seeds.high - seeds.low;
   double solid = 0;
-  for (const PlacedSphere& sphere : spheres) solid += volume(sphere.diameter);
+  for (const PlacedSphere& sphere : spheres) solid += sphere_volume(sphere.diameter);
   std::ostringstream message;
   message << path << ".random.region: " << spheres.size() << " spheres of ";
   if (spheres.back().diameter < spheres.front().diameter) message << spheres.back().diameter << " to ";
@@ -197,7 +190,7 @@ Occupied empty_room(const std::vector<SeedKind>& kinds, const std::vector<SeedRe
 
 std::vector<double> number_shares(const std::vector<SeedKind>& kinds, std::vector<double> shares, Basis basis) {
   if (basis == Basis::mass)
-    for (std::size_t k = 0; k < kinds.size(); ++k) shares[k] /= kinds[k].density * mean_volume(kinds[k]);
+    for (std::size_t k = 0; k < kinds.size(); ++k) shares[k] /= kinds[k].density * kinds[k].mean_volume();
   const double sum = std::accumulate(shares.begin(), shares.end(), 0.0);
   for (double& share : shares) share /= sum;
   return shares;
@@ -211,7 +204,7 @@ std::int64_t expected_count(const std::vector<SeedKind>& kinds, const SeedRegion
   if (!(seeds.solids_fraction > 0)) return seeds.count;
   const std::vector<double> volumes = volumes_wanted(kinds, seeds);
   std::int64_t count = 0;
-  for (std::size_t k = 0; k < kinds.size(); ++k) count += std::llround(volumes[k] / mean_volume(kinds[k]));
+  for (std::size_t k = 0; k < kinds.size(); ++k) count += std::llround(volumes[k] / kinds[k].mean_volume());
   return count;
 }
 
@@ -260,28 +253,6 @@ ParticleStore keep_owned(const Decomposition& decomposition, const DemSetup& set
       store.add(setup, static_cast<std::int64_t>(i), s.position, s.velocity, s.spin, s.kind, s.diameter / 2);
   }
   return store;
-}
-
-namespace {
-
-ParticleStore seed_one(const Decomposition& decomposition, double radius, const SeedRegion& region) {
-  DemSetup setup;
-  setup.types = {{radius, 1, false}};
-  return keep_owned(decomposition, setup, seed_spheres({{"particles", SizeDistribution(ConstantSize{2 * radius}), 1}}, {region}));
-}
-
-}  // namespace
-
-ParticleStore seed_random(const Decomposition& decomposition, double radius, const RandomSeeds& seeds) {
-  return seed_one(decomposition, radius, {"particles", seeds});
-}
-
-ParticleStore seed_lattice(const Decomposition& decomposition, double radius, Int3 count, Vec3 low, Vec3 high) {
-  return seed_one(decomposition, radius, {"particles", LatticeSeeds{count, low, high}});
-}
-
-ParticleStore seed_placed(const Decomposition& decomposition, const std::vector<PlacedSphere>& spheres) {
-  return seed_one(decomposition, 1, {"particles", spheres});
 }
 
 }  // namespace bedflow

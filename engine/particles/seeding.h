@@ -7,6 +7,7 @@
 #include <variant>
 #include <vector>
 
+#include "base/sphere.h"
 #include "parallel/decomposition.h"
 #include "particles/sizes.h"
 #include "particles/store.h"
@@ -18,6 +19,8 @@ struct SeedKind {
   std::string name;
   SizeDistribution sizes;
   double density = 0;  // kg/m³
+
+  double mean_volume() const { return sphere_volume(1) * sizes.moment(3); }  // m³, of the law
 };
 
 // Shares by number, adding up to 1, from shares of either basis; the mean masses are those of the laws.
@@ -70,10 +73,5 @@ std::vector<PlacedSphere> seed_spheres(const std::vector<SeedKind>& kinds, const
 
 // Those that this rank's block owns; the id is the place in the list.
 ParticleStore keep_owned(const Decomposition& decomposition, const DemSetup& setup, const std::vector<PlacedSphere>& spheres);
-
-// One kind of one size in one region.
-ParticleStore seed_random(const Decomposition& decomposition, double radius, const RandomSeeds& seeds);
-ParticleStore seed_lattice(const Decomposition& decomposition, double radius, Int3 count, Vec3 low, Vec3 high);
-ParticleStore seed_placed(const Decomposition& decomposition, const std::vector<PlacedSphere>& spheres);
 
 }  // namespace bedflow

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <numbers>
 #include <vector>
 
+#include "base/sphere.h"
 #include "base/vec3.h"
 
 namespace bedflow {
@@ -20,12 +20,8 @@ struct ParticleType {
   bool distributed = false;  // each particle has a radius of its own, in ParticleStore::radius
 
   double mass() const { return mass_of(radius); }
-  double mass_of(double r) const { return 4 * std::numbers::pi / 3 * density * r * r * r; }
+  double mass_of(double r) const { return density * sphere_volume(2 * r); }
 };
-// I of a solid sphere, kg m².
-inline double inertia_of(double mass, double radius) {
-  return 0.4 * mass * radius * radius;
-}
 
 // How the force of the gas follows a particle's velocity within a gas step, and what the gas has not lost yet.
 struct GasResponse {
@@ -152,14 +148,14 @@ struct ParticleStore {
   }
 };
 
-inline const ParticleType& type_of(const DemSetup& setup, const ParticleStore& particles, std::size_t i) {
-  return setup.types[particles.type.empty() ? 0 : particles.type[i]];
+inline const ParticleType& type_of(const std::vector<ParticleType>& types, const ParticleStore& particles, std::size_t i) {
+  return types[particles.type.empty() ? 0 : particles.type[i]];
 }
-inline double radius_of(const DemSetup& setup, const ParticleStore& particles, std::size_t i) {
-  return particles.radius.empty() ? type_of(setup, particles, i).radius : particles.radius[i];
+inline double radius_of(const std::vector<ParticleType>& types, const ParticleStore& particles, std::size_t i) {
+  return particles.radius.empty() ? type_of(types, particles, i).radius : particles.radius[i];
 }
-inline double mass_of(const DemSetup& setup, const ParticleStore& particles, std::size_t i) {
-  return type_of(setup, particles, i).mass_of(radius_of(setup, particles, i));
+inline double mass_of(const std::vector<ParticleType>& types, const ParticleStore& particles, std::size_t i) {
+  return type_of(types, particles, i).mass_of(radius_of(types, particles, i));
 }
 
 }  // namespace bedflow

@@ -52,7 +52,7 @@ WallResult each_face_contact(PairList& list, const std::array<Plane, 6>& faces, 
   for (std::size_t w = 0; w < list.near.size(); ++w) {
     const auto [i, face] = list.near[w];
     const Vec3 v = particles.velocity(i);
-    const double distance = faces[face].distance(particles.position(i)), radius = radius_of(setup, particles, i);
+    const double distance = faces[face].distance(particles.position(i)), radius = radius_of(setup.types, particles, i);
     result.passed |= !(distance >= 0);
     if (!(distance < radius + range) || setup.sides[face / 2][face % 2] == Side::open) continue;
     const std::size_t type = particles.type.empty() ? 0 : particles.type[i];
@@ -76,11 +76,17 @@ WallResult each_face_contact(PairList& list, const std::array<Plane, 6>& faces, 
   return result;
 }
 
-// A contact's memory row, emptied when it did not touch in the sub-step before.
-inline Vec3& recalled(MemoryRow& row, double now) {
-  if (row.touched != now - 1) row.value = {};
-  row.touched = now;
-  return row.value;
+// What the law says of a contact, from its memory row where it has a memory: emptied when it did not touch in the sub-step
+// before.
+template <class Law, class Contact>
+Vec3 with_memory(const Law& law, const Contact& contact, MemoryRow* row, double now) {
+  if constexpr (!Law::history) {
+    return law(contact);
+  } else {
+    if (row->touched != now - 1) row->value = {};
+    row->touched = now;
+    return law(contact, row->value);
+  }
 }
 
 // Each of the sweeps runs over each(range, take), which calls take(contact) as each_face_contact does.
@@ -93,12 +99,7 @@ WallResult sweep_walls(const Each& each, const ParticleStore& particles, const B
     if constexpr (Tangential::rotation) {
       const Vec3 slip = c.velocity - c.touching.approach * c.n + cross(c.distance * particles.spin(c.particle), c.n);
       const Sliding<double> sliding{c.n, slip, abs(normal), 2.0 / 7 * c.touching.mass, bodies.dt, c.touching};
-      Vec3 friction;
-      if constexpr (Tangential::history) {
-        friction = tangential[c.law](sliding, recalled(*c.displacement, bodies.now));
-      } else {
-        friction = tangential[c.law](sliding);
-      }
+      const Vec3 friction = with_memory(tangential[c.law], sliding, c.displacement, bodies.now);
       force += friction;
       torque = c.distance * cross(c.n, friction);
     }
@@ -114,12 +115,7 @@ void sweep_walls_rolling(const Each& each, const ParticleStore& particles, const
     const RollingContact<double> rolls{
         c.n,       spin - dot(spin, c.n) * c.n, abs(contact[c.law](c.touching)), inertia_of(c.touching.mass, c.radius), bodies.dt,
         c.touching};
-    Vec3 torque;
-    if constexpr (Rolling::history) {
-      torque = rolling[c.law](rolls, recalled(*c.angle, bodies.now));
-    } else {
-      torque = rolling[c.law](rolls);
-    }
+    const Vec3 torque = with_memory(rolling[c.law], rolls, c.angle, bodies.now);
     c.push(bodies, {}, torque);
     if (c.wall_torque) *c.wall_torque -= torque;
   });

@@ -61,7 +61,7 @@ void Walls::list(Part& part, const DemSetup& setup, const ParticleStore& particl
   const auto add = [&](const auto& shape) {
     for (std::uint32_t i = 0; i < places.size(); ++i) {
       const Vec3 x = part.frame.to_body(places[i]);
-      const double reach = radius_of(setup, particles, i) + extra;
+      const double reach = radius_of(setup.types, particles, i) + extra;
       const auto first = static_cast<std::uint32_t>(part.facets.size());
       if constexpr (std::is_same_v<std::decay_t<decltype(shape)>, Mesh>) {
         if (!shape.near(x, reach, part.facets)) continue;
@@ -102,7 +102,7 @@ void Walls::meet_part(const Shape& shape, std::size_t index, const DemSetup& set
   for (const Near& near : part.near) {
     const std::uint32_t i = near.particle;
     const Vec3 x = particles.position(i), body = part.frame.to_body(x);
-    const double radius = radius_of(setup, particles, i);
+    const double radius = radius_of(setup.types, particles, i);
     double rise = smooth_rise;
     touches_.clear();
     if constexpr (std::is_same_v<Shape, Mesh>) {

@@ -18,7 +18,7 @@ void sum_over_particles(const Law& law, const StatisticScene& scene, const Obser
   const ParticleStore& particles = *now.particles;
   for (std::size_t i = 0; i < particles.owned; ++i) {
     const int type = particles.type.empty() ? 0 : particles.type[i];
-    const double radius = radius_of(*now.types, particles, i), mass = now.types->types[type].mass_of(radius);
+    const double radius = radius_of(*now.types, particles, i), mass = (*now.types)[type].mass_of(radius);
     law.add(scene, {particles.position(i), particles.velocity(i), particles.spin(i), radius, mass, type}, sums);
   }
 }

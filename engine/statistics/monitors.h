@@ -37,11 +37,11 @@ struct Observation {
   const Field* fraction = nullptr;           // ε
   const ParticleStore* particles = nullptr;  // of this rank
   std::vector<WallLoad> wall_loads{};        // in the step, the mean, this rank; of the faces of the box, then of the walls
-  const DemSetup* types = nullptr;           // of the particles
-  double max_overlap = 0;                    // in the step, over the diameter, this rank
-  double mass_residual = 0;                  // in the step, the same on every rank
-  double momentum_residual = 0;              // in the step, the same on every rank
-  double mass_entered = 0, mass_left = 0;    // particles since time 0, kg, the same on every rank
+  const std::vector<ParticleType>* types = nullptr;  // of the particles
+  double max_overlap = 0;                            // in the step, over the diameter, this rank
+  double mass_residual = 0;                          // in the step, the same on every rank
+  double momentum_residual = 0;                      // in the step, the same on every rank
+  double mass_entered = 0, mass_left = 0;            // particles since time 0, kg, the same on every rank
 };
 
 struct SampleOut {

@@ -190,7 +190,7 @@ Bed BedScene::bed() const {
   for (std::size_t i = 0; i < particles.owned; ++i) {
     const int kind = particles.type.empty() ? 0 : particles.type[i];
     bed.spheres[static_cast<std::size_t>(particles.id[i])] = {particles.position(i), particles.velocity(i), particles.spin(i),
-                                                              kind, 2 * radius_of(dem.setup(), particles, i)};
+                                                              kind, 2 * radius_of(dem.setup().types, particles, i)};
   }
   return bed;
 }

@@ -2,12 +2,13 @@
 #pragma once
 
 #include <cmath>
+#include <cstring>
 #include <map>
 #include <numbers>
 #include <vector>
 
 #include "particles/dem.h"
-#include "particles/seeding.h"
+#include "support/seeds.h"
 
 namespace bedflow {
 
@@ -96,5 +97,22 @@ class Scene {
   PhaseTimer timer;
   Dem dem;
 };
+
+// What a checkpoint holds of a rank's particles.
+struct Saved {
+  ParticleStore particles;
+  std::vector<Vec3> places;
+  std::vector<PairHistory> pairs;
+  std::vector<WallHistory> walls;
+  explicit Saved(const Dem& dem)
+      : particles(dem.particles()),
+        places(dem.positions_at_rebuild()),
+        pairs(dem.pair_histories()),
+        walls(dem.wall_histories()) {}
+};
+
+inline bool same_bits(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
+  return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(Vec3)) == 0);
+}
 
 }  // namespace bedflow

@@ -1,4 +1,4 @@
-#include "particles/seeding.h"
+#include "support/seeds.h"
 
 #include <gtest/gtest.h>
 

@@ -10,10 +10,8 @@
 namespace bedflow {
 namespace {
 
-DemSetup spheres_of_two_kilograms() {
-  DemSetup setup;
-  setup.types = {{.radius = 0.01, .density = 2 / (4e-6 / 3 * std::numbers::pi), .distributed = false}};
-  return setup;
+std::vector<ParticleType> spheres_of_two_kilograms() {
+  return {{.radius = 0.01, .density = 2 / (4e-6 / 3 * std::numbers::pi), .distributed = false}};
 }
 
 constexpr double round_off = 1e-13;  // relative, of sums of tens of terms in any order
@@ -43,7 +41,7 @@ struct Box {
     --particles.owned;
   }
   void clear() { particles = {}; }
-  DemSetup types = spheres_of_two_kilograms();
+  std::vector<ParticleType> types = spheres_of_two_kilograms();
   Observation observation() const {
     return {
         .decomposition = decomposition,

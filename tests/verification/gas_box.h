@@ -135,4 +135,16 @@ inline void fill_exchange(GasBox& box, double drag, double solids, Vec3 speed = 
     });
 }
 
+// A bed at rest, ε = 0.45 and of given drag density (kg/m³s), in the lower half of a box 0.12 m and 24 cells high: the
+// coefficients jump at its surface.
+inline void fill_lower_half(GasBox& box, double drag) {
+  set_fraction(box, [](double, double y, double) { return y < 0.06 ? 0.45 : 1.0; });
+  for (int d = 0; d < 3; ++d)
+    for_solved(box, d, [&, d](int i, int j, int k) {
+      if (j > 12) return;
+      box.exchange.drag[d](i, j, k) = drag * box.grid.cell_volume();
+      box.exchange.buoyancy[d](i, j, k) = 0.55;
+    });
+}
+
 }  // namespace bedflow

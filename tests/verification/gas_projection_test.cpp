@@ -102,13 +102,7 @@ TEST(Projection, TakesAnyDrag) {
     GasSetup setup = tight(upright(0.5), GasMethod::projection);
     setup.preconditioner = Preconditioner::multigrid;
     GasBox box({9, 24, 4}, {0.045, 0.12, 0.02}, {false, false, false}, setup, Comm::self(), 1);
-    set_fraction(box, [](double, double y, double) { return y < 0.06 ? 0.45 : 1.0; });
-    for (int d = 0; d < 3; ++d)
-      for_solved(box, d, [&, d](int i, int j, int k) {
-        if (j > 12) return;
-        box.exchange.drag[d](i, j, k) = ratio * setup.density * 0.45 * box.grid.cell_volume() / dt;
-        box.exchange.buoyancy[d](i, j, k) = 0.55;
-      });
+    fill_lower_half(box, ratio * setup.density * 0.45 / dt);
     for (int n = 0; n < 20; ++n) {
       const GasOutcome outcome = box.step(dt, true);
       ASSERT_TRUE(outcome.converged) << ratio << ": " << outcome.reason;

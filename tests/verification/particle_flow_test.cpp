@@ -204,7 +204,7 @@ TEST(Bed, OfTwoTypesStandsOnTheFloorWithItsWeight) {
   const auto momentum = [&] {
     double sum = 0;
     for (std::size_t i = 0; i < dem.particles().owned; ++i)
-      sum += mass_of(dem.setup(), dem.particles(), i) * dem.particles().velocity(i).y;
+      sum += mass_of(dem.setup().types, dem.particles(), i) * dem.particles().velocity(i).y;
     return world.sum(sum);
   };
   const double begin = run.simulation.time(), before = momentum();
@@ -213,7 +213,7 @@ TEST(Bed, OfTwoTypesStandsOnTheFloorWithItsWeight) {
     run.simulation.step();
     for (std::size_t i = 0; i < dem.particles().owned; ++i)
       impulse += run.simulation.last_step() * 200 *
-                 std::max(0.0, radius_of(dem.setup(), dem.particles(), i) - dem.particles().position(i).y);
+                 std::max(0.0, radius_of(dem.setup().types, dem.particles(), i) - dem.particles().position(i).y);
   }
   const double weight = 9.81 * run.simulation.turnover().initial.mass, time = run.simulation.time() - begin;
   EXPECT_NEAR((world.sum(impulse) - (momentum() - before)) / (weight * time), 1, 1e-3);

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "support/dem_scene.h"
+#include "support/touching_pairs.h"
 
 namespace bedflow {
 namespace {
@@ -106,14 +107,8 @@ TEST(PairList, NoContactIsEverMissed) {
     std::int64_t met = 0;
     for (int n = 0; n < 300; ++n) {
       const auto particles = scene.gathered();
-      std::int64_t expected = 0;
-      for (auto i = particles.begin(); i != particles.end(); ++i)
-        for (auto j = std::next(i); j != particles.end(); ++j) {
-          Vec3 apart = j->second.position - i->second.position;
-          if (periodic)
-            for (int d = 0; d < 3; ++d) apart[d] -= edge * std::round(apart[d] / edge);
-          expected += norm(apart) < spheres.diameter;
-        }
+      const auto both = [&](const Particle&, const Particle&) { return spheres.diameter; };
+      const std::int64_t expected = touching_pairs(particles, both, periodic ? edge : 0);
       scene.advance(1, dt);
       ASSERT_EQ(scene.decomposition().comm().sum(scene.dem.contact_count()), expected) << "sub-step " << n;
       met += expected;

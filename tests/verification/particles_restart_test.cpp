@@ -46,22 +46,6 @@ double largest_difference(const std::map<std::int64_t, Particle>& a, const std::
   return largest;
 }
 
-struct Saved {
-  ParticleStore particles;
-  std::vector<Vec3> places;
-  std::vector<PairHistory> pairs;
-  std::vector<WallHistory> walls;
-  explicit Saved(const Dem& dem)
-      : particles(dem.particles()),
-        places(dem.positions_at_rebuild()),
-        pairs(dem.pair_histories()),
-        walls(dem.wall_histories()) {}
-};
-
-bool same_bits(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
-  return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(Vec3)) == 0);
-}
-
 // The same trajectory whether the list, and with it every history, is rebuilt hundreds of times or a few times.
 TYPED_TEST(Restart, HistoriesSurviveRebuildsAndMigration) {
   Scene<TypeParam> scene(Comm::world(), edges, loaded());

@@ -7,6 +7,7 @@
 #include <random>
 
 #include "particles/dem.h"
+#include "support/touching_pairs.h"
 
 namespace bedflow {
 namespace {
@@ -53,7 +54,8 @@ class Mixture {
     std::vector<double> mine;
     const ParticleStore& p = dem.particles();
     for (std::size_t i = 0; i < p.owned; ++i) {
-      mine.insert(mine.end(), {static_cast<double>(p.id[i]), radius_of(dem.setup(), p, i), mass_of(dem.setup(), p, i)});
+      mine.insert(mine.end(),
+                  {static_cast<double>(p.id[i]), radius_of(dem.setup().types, p, i), mass_of(dem.setup().types, p, i)});
       for (const Vec3 v : {p.position(i), p.velocity(i), p.spin(i)}) mine.insert(mine.end(), {v.x, v.y, v.z});
     }
     const std::vector<double> all = decomposition_.comm().gather_all(mine);
@@ -172,14 +174,8 @@ TEST(Types, NoContactIsEverMissed) {
     std::int64_t met = 0;
     for (int n = 0; n < 250; ++n) {
       const auto spheres = crowd.gathered();
-      std::int64_t expected = 0;
-      for (auto i = spheres.begin(); i != spheres.end(); ++i)
-        for (auto j = std::next(i); j != spheres.end(); ++j) {
-          Vec3 apart = j->second.position - i->second.position;
-          if (periodic)
-            for (int d = 0; d < 3; ++d) apart[d] -= Mixture::edge * std::round(apart[d] / Mixture::edge);
-          expected += norm(apart) < i->second.radius + j->second.radius;
-        }
+      const auto both = [](const Sphere& a, const Sphere& b) { return a.radius + b.radius; };
+      const std::int64_t expected = touching_pairs(spheres, both, periodic ? Mixture::edge : 0);
       crowd.dem.advance(1, sub_step);
       ASSERT_EQ(crowd.comm().sum(crowd.dem.contact_count()), expected) << "sub-step " << n;
       met += expected;

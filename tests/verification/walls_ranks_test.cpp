@@ -31,22 +31,6 @@ void start(Scene<TangentialSpring>& scene) {
   scene.seed({150, 5, {0.005, 0.006, 0}, {0.015, 0.015, edges.z}, 0.1});
 }
 
-struct Saved {
-  ParticleStore particles;
-  std::vector<Vec3> places;
-  std::vector<PairHistory> pairs;
-  std::vector<WallHistory> walls;
-  explicit Saved(const Dem& dem)
-      : particles(dem.particles()),
-        places(dem.positions_at_rebuild()),
-        pairs(dem.pair_histories()),
-        walls(dem.wall_histories()) {}
-};
-
-bool same_bits(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
-  return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(Vec3)) == 0);
-}
-
 constexpr int first = 5000, more = 1000;
 
 TEST(WallsRestart, TheSameRanksGoOnWithTheSameBits) {
