@@ -41,10 +41,7 @@ std::vector<pid_t> members(const JobFolder& folder, std::uint32_t epoch) {
   v1::Runner runner;
   if (!read_message(folder.runner(epoch), runner)) return {};
   auto found = session_members(static_cast<pid_t>(runner.pid()));
-  std::erase_if(found, [&](pid_t member) {
-    const std::string command = read_text("/proc/" + std::to_string(member) + "/cmdline");
-    return command.find(folder.root().string()) == std::string::npos;
-  });
+  std::erase_if(found, [&](pid_t member) { return command_line(member).find(folder.root().string()) == std::string::npos; });
   return found;
 }
 

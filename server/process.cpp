@@ -74,10 +74,16 @@ bool has_ended_by(pid_t child, Clock::time_point deadline) {
   return ended;
 }
 
+// A file of /proc/<pid>; empty when the process is gone, also when it goes between the opening and the reading.
+std::string process_file(pid_t process, const std::string& name) {
+  std::ostringstream text;
+  text << std::ifstream("/proc/" + std::to_string(process) + "/" + name).rdbuf();
+  return text.str();
+}
+
 // Fields of /proc/<pid>/stat from the third on: the second, the name, may hold anything.
 std::vector<std::string> stat_fields(pid_t process) {
-  std::ifstream file("/proc/" + std::to_string(process) + "/stat");
-  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  const std::string text = process_file(process, "stat");
   const auto name_end = text.rfind(')');
   if (name_end == std::string::npos) return {};
   std::istringstream rest(text.substr(name_end + 1));
@@ -157,6 +163,10 @@ std::optional<std::uint64_t> start_ticks(pid_t process) {
   const auto fields = stat_fields(process);
   if (fields.size() < 20 || fields[0] == "Z") return std::nullopt;
   return std::stoull(fields[19]);
+}
+
+std::string command_line(pid_t process) {
+  return process_file(process, "cmdline");
 }
 
 std::vector<pid_t> session_members(pid_t session) {

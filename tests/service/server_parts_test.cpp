@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <thread>
 #include <stdexcept>
 
 #include "catalogue.h"
@@ -195,6 +196,22 @@ TEST(Process, OneThatSaysTooMuchIsKilled) {
   const auto answer = ask({"yes"}, std::chrono::seconds(20), 100'000);
   EXPECT_EQ(answer.exit_code, 128 + 9);
   EXPECT_LT(answer.output.size(), 1'000'000u);
+}
+
+// A process may end between the opening and the reading of its files, which then fails.
+TEST(Process, OnesThatEndWhileTheyAreLookedAtAreGone) {
+  for (int round = 0; round < 20; ++round) {
+    std::vector<pid_t> children;
+    for (int i = 0; i < 20; ++i) children.push_back(server::launch({.command = {"true"}, .environment = {}}));
+    std::jthread reaper([&] {
+      for (const pid_t child : children) server::wait_for_exit(child);
+    });
+    const pid_t last = children.back();
+    while (server::start_ticks(last)) {
+      for (const pid_t child : children) EXPECT_TRUE(server::command_line(child).find("false") == std::string::npos);
+      EXPECT_TRUE(server::session_members(last).empty());
+    }
+  }
 }
 
 TEST(Submission, TheSpecificationsFaultsAreAllNamed) {
