@@ -4,8 +4,8 @@
 
 #include <filesystem>
 #include <fstream>
-#include <thread>
 #include <stdexcept>
+#include <thread>
 
 #include "catalogue.h"
 #include "folder.h"
