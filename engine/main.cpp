@@ -25,13 +25,25 @@ struct Arguments {
   std::optional<std::uint64_t> from;
   int ranks = 1;
   std::uint32_t most = 0;
+  bool plans = false;
 };
 
-int carry_out(const Comm& world, const Arguments& arguments) {
-  if (!arguments.plan_case.empty()) {
-    if (world.root()) std::cout << plan_report(make_plan(bedflow::read_scene(arguments.plan_case), arguments.ranks));
+// Plans need no other rank: MPI is not started for them.
+int plan(const Arguments& arguments) {
+  try {
+    if (arguments.plans) return bedflow::answer_plans(std::cin, std::cout) ? 0 : static_cast<int>(Reason::internal);
+    std::cout << plan_report(make_plan(bedflow::read_scene(arguments.plan_case), arguments.ranks));
     return 0;
+  } catch (const bedflow::Stop& stop) {
+    std::cerr << "bedflow-engine: " << stop.what() << "\n";
+    return static_cast<int>(stop.reason);
+  } catch (const std::exception& error) {
+    std::cerr << "bedflow-engine: " << error.what() << "\n";
+    return static_cast<int>(Reason::internal);
   }
+}
+
+int carry_out(const Comm& world, const Arguments& arguments) {
   if (!arguments.checkpoint.empty()) {
     if (world.root()) std::cout << bedflow::snapshot_of(arguments.checkpoint, arguments.most);
     return 0;
@@ -52,15 +64,18 @@ int main(int argc, char** argv) {
   app.add_option("--from", arguments.from, "go on from the checkpoint of this step");
   app.add_option("--plan", arguments.plan_case, "print the plan of a case file (PlanReport, text format) and stop")
       ->check(CLI::ExistingFile);
+  app.add_flag("--plans", arguments.plans, "answer questions for plans on the standard input until it ends (plan_report.h)");
   app.add_option("--ranks", arguments.ranks, "ranks that --plan is for")->check(CLI::Range(1, 100000));
   app.add_option("--snapshot", arguments.checkpoint, "print what a picture needs of a checkpoint (Snapshot, binary) and stop")
       ->check(CLI::ExistingFile);
   app.add_option("--most", arguments.most, "most particles in the snapshot; 0: all");
   CLI11_PARSE(app, argc, argv);
-  if (arguments.folder.empty() && arguments.plan_case.empty() && arguments.checkpoint.empty()) {
+  if (arguments.folder.empty() && arguments.plan_case.empty() && arguments.checkpoint.empty() && !arguments.plans) {
     std::cerr << "bedflow-engine: a job folder is needed; see --help\n";
     return static_cast<int>(Reason::invalid_case);
   }
+
+  if (arguments.plans || !arguments.plan_case.empty()) return plan(arguments);
 
   mallopt(M_MMAP_THRESHOLD, 1 << 20);  // arrays that particles have outgrown go back to the system
 

@@ -40,7 +40,10 @@ struct Agreement {
 class Run {
  public:
   Run(const Comm& comm, const RunOptions& options)
-      : comm_(comm), options_(options), policy_(read_policy(options.folder)), folder_(comm, options.folder, options.epoch) {}
+      : comm_(comm),
+        options_(options),
+        policy_(read_policy(options.folder)),
+        folder_(comm, options.folder, options.epoch, policy_.go_on_when_full) {}
 
   Reason run() {
     Stop outcome(Reason::finished, "the end time is reached");
@@ -109,6 +112,7 @@ class Run {
     restore_statistics(reader);
     last_checkpoint_time_ = simulation_->time();
     last_checkpoint_step_ = simulation_->steps();
+    good_checkpoint_step_ = found->step;
     next_plot_ =
         plan_.scene.plot_interval ? static_cast<std::int64_t>(simulation_->time() / *plan_.scene.plot_interval + 1e-9) + 1 : 0;
     return found->path.filename().string();
@@ -168,15 +172,26 @@ class Run {
       if (agreed.cancel_now) return {Reason::cancelled, "cancelled without a checkpoint"};
       if (agreed.checkpoint || agreed.suspend || agreed.cancel || agreed.wall_limit) write_checkpoint_now();
       if (agreed.cancel) return {Reason::cancelled, "cancelled; the last checkpoint is kept"};
-      if (agreed.suspend) return {Reason::suspended, "suspended at a checkpoint"};
+      if (agreed.suspend) return {Reason::suspended, "suspended" + at_checkpoint()};
       if (agreed.wall_limit)
-        return {Reason::wall_limit, "the wall limit of the job is over; a checkpoint is there: resume the job with a longer one"};
+        return {Reason::wall_limit, "the wall limit of the job is over" + at_checkpoint() + ": resume the job with a longer one"};
     }
     if (last_checkpoint_step_ != simulation_->steps()) write_checkpoint_now();
     return {Reason::finished, "the end time is reached"};
   }
 
-  void finish(const Stop& outcome) {
+  void finish(Stop& outcome) {
+    if (outcome.reason == Reason::stale_epoch) {  // the folder is the later attempt's
+      folder_.leave();
+      if (comm_.root()) std::fprintf(stderr, "bedflow-engine: %s\n", outcome.what());
+      return;
+    }
+    folder_.sync();
+    if (outcome.reason == Reason::finished && comm_.any(folder_.has_unwritten())) {
+      outcome = Stop(Reason::disk_full,
+                     "the end time is reached, but the disk has no room for the last of the events and "
+                     "statistics; make room on it, then resume the job: it ends once more");
+    }
     const std::uint64_t steps = simulation_ ? simulation_->steps() : 0;
     const double time = simulation_ ? simulation_->time() : 0;
     if (simulation_) {
@@ -291,12 +306,26 @@ class Run {
                               1});
     content.arrays.push_back({"statistics/monitors", "", "what the sums belong to", monitors_signature(), {}, 1});
     content.arrays.push_back({"case", "", "the effective case, protobuf text format", case_text(), {}, 1});
-    folder_.sync();  // statistics up to here are on the disk before the checkpoint is
-    const CheckpointInfo info = write_checkpoint(comm_, options_.folder / "checkpoints", content, policy_.keep, options_.epoch);
     last_checkpoint_step_ = simulation_->steps();
     last_checkpoint_time_ = simulation_->time();
+    folder_.sync();  // statistics up to here are on the disk before the checkpoint is
+    try {
+      if (comm_.any(folder_.has_unwritten())) throw Stop(Reason::disk_full, "the disk has no room for what comes before it");
+      const CheckpointInfo info = write_checkpoint(comm_, options_.folder / "checkpoints", content, policy_.keep, options_.epoch);
+      good_checkpoint_step_ = info.step;
+      folder_.checkpoint(info.path.filename().string(), info.step, info.time, info.bytes, wall_seconds() - before);
+    } catch (const Stop& stop) {  // on every rank alike
+      if (stop.reason != Reason::disk_full || !policy_.go_on_when_full) throw;
+      folder_.warning("no checkpoint of step " + std::to_string(last_checkpoint_step_) + ", the run goes on: " + stop.what());
+    }
     last_checkpoint_wall_ = wall_seconds();
-    folder_.checkpoint(info.path.filename().string(), info.step, info.time, info.bytes, wall_seconds() - before);
+  }
+  // Where the run can be taken up: on a full disk that may be an earlier one than the last that was due.
+  std::string at_checkpoint() const {
+    if (!good_checkpoint_step_) return " without any checkpoint, the disk is full";
+    return *good_checkpoint_step_ == simulation_->steps()
+               ? " at a checkpoint"
+               : "; the newest checkpoint is of step " + std::to_string(*good_checkpoint_step_);
   }
 
   std::string case_text() const {
@@ -315,7 +344,12 @@ class Run {
   void write_plots() {
     if (!plan_.scene.plot_interval) return;
     const PhaseTimer::Scope scope(timer_, Phase::output);
-    write_plot_files(comm_, options_.folder / "plots", *simulation_);
+    try {
+      write_plot_files(comm_, options_.folder / "plots", *simulation_);
+    } catch (const Stop& stop) {
+      if (stop.reason != Reason::disk_full || !policy_.go_on_when_full) throw;
+      folder_.warning(std::string("no plot files, the run goes on: ") + stop.what());
+    }
     next_plot_ = static_cast<std::int64_t>(simulation_->time() / *plan_.scene.plot_interval + 1e-9) + 1;
   }
 
@@ -347,7 +381,8 @@ class Run {
   std::vector<std::string> checkpoint_faults_;
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
   double last_progress_ = 0, last_checkpoint_time_ = 0, last_checkpoint_wall_ = 0, settling_seconds_ = 0;
-  std::uint64_t last_checkpoint_step_ = 0;
+  std::uint64_t last_checkpoint_step_ = 0;  // written, or tried
+  std::optional<std::uint64_t> good_checkpoint_step_;
   std::int64_t next_plot_ = 0;
 };
 

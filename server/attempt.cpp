@@ -3,13 +3,11 @@
 #include <system_error>
 #include <utility>
 
-#include "follow.h"
-
 namespace bedflow::server {
 
 Attempt::Attempt(JobFolder folder, std::uint32_t epoch) : folder_(std::move(folder)), epoch_(epoch), reader_(folder_.events()) {}
 
-bool Attempt::look() {
+bool Attempt::look(const std::shared_ptr<Feed>& feed) {
   std::error_code missing;
   const auto touched = std::filesystem::last_write_time(folder_.heartbeat(), missing);
   if (!missing && touched != heartbeat_) {  // a change is told, not an age: clocks may jump
@@ -17,7 +15,14 @@ bool Attempt::look() {
     heard_ = std::chrono::steady_clock::now();
   }
   const auto before = last_sequence_;
-  if (!damaged_) damaged_ = !reader_.read([this](const LogRecord& record) { take(event_of(record)); });
+  if (!damaged_) {
+    damaged_ = !reader_.read([&](const LogRecord& record) {
+      auto event = std::make_shared<const v1::Event>(event_of(record));
+      take(*event);
+      if (feed) feed->add(std::move(event));
+    });
+  }
+  if (damaged_ && feed) feed->set_damaged();
   return last_sequence_ != before;
 }
 
@@ -27,7 +32,10 @@ void Attempt::take(const v1::Event& event) {
   if (event.has_checkpoint()) checkpoint_ = event;
   if (event.epoch() != epoch_) return;  // history, or an engine that has been replaced
   heard_ = std::chrono::steady_clock::now();
-  if (event.has_started()) started_ = true;
+  if (event.has_started()) {
+    started_ = true;
+    start_step_ = event.started().step();
+  }
   if (event.has_stopped()) stopped_ = event.stopped();
 }
 
@@ -41,7 +49,9 @@ Ending Attempt::ending() const {
   }
   const std::string code = std::to_string(record.exit_code());
   if (record.exit_code() == 127) return {v1::BACKEND_ERROR, "the engine could not be started" + said};
-  // The disk may have been too full for the last event: then the exit code is the word.
+  if (record.exit_code() == v1::DISK_FULL)
+    return {v1::DISK_FULL, "the disk is full; make room on it, then resume the job" + said};
+  // The last event may not have been written: then the exit code is the word.
   if (record.exit_code() >= v1::INVALID_CASE && v1::StopReason_IsValid(record.exit_code())) {
     return {static_cast<v1::StopReason>(record.exit_code()), "the engine ended with exit code " + code + said};
   }

@@ -5,10 +5,12 @@
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 
 #include "folder.h"
+#include "follow.h"
 #include "record_log.h"
 
 namespace bedflow::server {
@@ -22,11 +24,13 @@ class Attempt {
  public:
   Attempt(JobFolder folder, std::uint32_t epoch);
 
-  bool look();  // reads what is new; true when there is something
+  // Reads what is new and tells it to the job's watchers, if there are any; true when there is something.
+  bool look(const std::shared_ptr<Feed>& feed = nullptr);
 
   std::uint32_t epoch() const { return epoch_; }
   const JobFolder& folder() const { return folder_; }
   bool has_started() const { return started_; }
+  bool has_gone_on() const { return checkpoint_.epoch() == epoch_ && checkpoint_.checkpoint().step() > start_step_; }
   const std::optional<v1::Stopped>& stopped() const { return stopped_; }
   const v1::Progress& progress() const { return progress_; }  // newest of the job
   std::uint64_t last_sequence() const { return last_sequence_; }
@@ -44,6 +48,7 @@ class Attempt {
   std::uint32_t epoch_;
   LogReader reader_;
   bool started_ = false;
+  std::uint64_t start_step_ = 0;
   bool damaged_ = false;
   std::optional<v1::Stopped> stopped_;
   v1::Progress progress_;

@@ -2,12 +2,14 @@
 
 #include <sqlite3.h>
 
+#include <cerrno>
 #include <stdexcept>
+#include <system_error>
 
 namespace bedflow::server {
 namespace {
 
-constexpr const char* schema = R"(
+constexpr const char* jobs_table = R"(
   CREATE TABLE jobs (
     number INTEGER PRIMARY KEY AUTOINCREMENT,
     id TEXT NOT NULL UNIQUE,
@@ -16,14 +18,35 @@ constexpr const char* schema = R"(
     from_step INTEGER,
     job BLOB NOT NULL);
   CREATE INDEX jobs_by_state ON jobs (state, number);
-  CREATE TABLE requests (
-    id TEXT PRIMARY KEY,
-    job TEXT NOT NULL REFERENCES jobs (id),
-    content BLOB NOT NULL) WITHOUT ROWID;
-  PRAGMA user_version = 1;
+)";
+constexpr const char* submissions_table = R"(
+  CREATE TABLE submissions (
+    number INTEGER PRIMARY KEY REFERENCES jobs (number),
+    request_id TEXT UNIQUE,
+    content BLOB NOT NULL);
+  PRAGMA user_version = 2;
+)";
+constexpr const char* from_version_1 = R"(
+  INSERT INTO submissions SELECT jobs.number, requests.id, requests.content FROM requests JOIN jobs ON jobs.id = requests.job;
+  DROP TABLE requests;
+)";
+
+// A commit that overwrites its part of the write-ahead log waits for the data alone; one that makes the log longer waits for the
+// file system's journal too, twenty times as long. So the log is made as long as it will be until SQLite begins it anew (1000
+// pages of 4096 bytes), once, before the first commit that somebody waits for.
+constexpr const char* make_room = R"(
+  BEGIN IMMEDIATE;
+  CREATE TABLE room (bytes BLOB);
+  INSERT INTO room VALUES (zeroblob(5000000));
+  COMMIT;
+  DROP TABLE room;
+  PRAGMA wal_checkpoint(RESTART);
 )";
 
 [[noreturn]] void fail(sqlite3* database, const std::string& doing) {
+  const int code = sqlite3_errcode(database) & 0xff;
+  if (code == SQLITE_FULL || (code == SQLITE_IOERR && sqlite3_system_errno(database) == ENOSPC))
+    throw std::system_error(ENOSPC, std::generic_category(), "catalogue: " + doing);
   throw std::runtime_error("catalogue: " + doing + ": " + sqlite3_errmsg(database));
 }
 
@@ -50,6 +73,7 @@ class Statement {
   Statement& bind(const std::optional<std::uint64_t>& value) {
     return value ? bind(static_cast<std::int64_t>(*value)) : checked(sqlite3_bind_null(statement_, ++bound_));
   }
+  void reset() { sqlite3_reset(statement_); }
   bool step() {  // true: there is a row
     const int result = sqlite3_step(statement_);
     if (result != SQLITE_ROW && result != SQLITE_DONE) fail(database_, "step");
@@ -135,17 +159,27 @@ Catalogue::Catalogue(const std::filesystem::path& file) {
   run(database, "PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL; PRAGMA foreign_keys=ON; PRAGMA busy_timeout=2000;");
   Statement version(database, "PRAGMA user_version");
   version.step();
-  if (version.number(0) > 1) throw std::runtime_error("catalogue: " + file.string() + " was written by a newer bedflowd");
-  if (version.number(0) == 1) return;
-  Transaction transaction(database);
-  run(database, schema);
-  transaction.commit();
+  const auto found = version.number(0);
+  version.reset();
+  if (found > 2) throw std::runtime_error("catalogue: " + file.string() + " was written by a newer bedflowd");
+  if (found < 2) {
+    Transaction transaction(database);
+    if (found == 0) run(database, jobs_table);
+    run(database, submissions_table);
+    if (found == 1) run(database, from_version_1);
+    transaction.commit();
+  }
+  std::error_code none;
+  const auto log_bytes = std::filesystem::file_size(file.string() + "-wal", none);
+  if ((none || log_bytes < 4'000'000) && sqlite3_exec(database, make_room, nullptr, nullptr, nullptr) != SQLITE_OK) {
+    sqlite3_exec(database, "ROLLBACK", nullptr, nullptr, nullptr);  // a disk too full for it: commits are slower, no more
+  }
 }
 
 Catalogue::~Catalogue() = default;
 
 std::optional<Catalogue::Request> Catalogue::find_request(const std::string& request_id) const {
-  Statement row(database_.get(), "SELECT job, content FROM requests WHERE id = ?");
+  Statement row(database_.get(), "SELECT id, content FROM submissions JOIN jobs USING (number) WHERE request_id = ?");
   if (!row.bind(request_id).step()) return std::nullopt;
   return Request{row.bytes(0), row.bytes(1)};
 }
@@ -156,11 +190,14 @@ void Catalogue::insert(JobRecord& record, const std::string& request_id, const s
   job.bind(record.job.id()).bind(record.job.state()).bind(record.retries).bind(record.from_step);
   job.bind_blob(record.job.SerializeAsString()).step();
   record.number = sqlite3_last_insert_rowid(database_.get());
-  if (!request_id.empty()) {
-    Statement request(database_.get(), "INSERT INTO requests (id, job, content) VALUES (?, ?, ?)");
-    request.bind(request_id).bind(record.job.id()).bind_blob(content).step();
-  }
+  Statement submission(database_.get(), "INSERT INTO submissions (number, request_id, content) VALUES (?, nullif(?, ''), ?)");
+  submission.bind(record.number).bind(request_id).bind_blob(content).step();
   transaction.commit();
+}
+
+std::string Catalogue::content(const JobRecord& record) const {
+  Statement row(database_.get(), "SELECT content FROM submissions WHERE number = ?");
+  return row.bind(record.number).step() ? row.bytes(0) : std::string();
 }
 
 void Catalogue::update(const JobRecord& record) {

@@ -21,7 +21,7 @@ struct JobRecord {
   std::optional<std::uint64_t> from_step;  // checkpoint that the next attempt must take up
 };
 
-// Not thread-safe. Any failure throws std::runtime_error with SQLite's words.
+// Not thread-safe. Any failure throws std::runtime_error with SQLite's words; a full disk std::system_error (ENOSPC).
 class Catalogue {
  public:
   explicit Catalogue(const std::filesystem::path& file);
@@ -31,11 +31,12 @@ class Catalogue {
 
   struct Request {
     std::string job;
-    std::string content;  // the request, serialized deterministically
+    std::string content;  // what was asked: a CreateJobRequest, serialized deterministically
   };
   std::optional<Request> find_request(const std::string& request_id) const;
-  // Job and request id in one transaction; an empty request id is not kept. Gives the record its number.
+  // Job and what was asked in one transaction; request_id may be empty. Gives the record its number.
   void insert(JobRecord& record, const std::string& request_id, const std::string& content);
+  std::string content(const JobRecord& record) const;  // empty: created before content was kept for every job
   void update(const JobRecord& record);
 
   std::optional<JobRecord> find(const std::string& id) const;

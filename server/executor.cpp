@@ -61,6 +61,8 @@ void LocalExecutor::start(const JobFolder& folder, std::uint32_t epoch, std::uin
     throw std::system_error(errno, std::generic_category(), "creating the files of " + folder.attempt(epoch).string());
   }
   if (::flock(lock.number(), LOCK_EX | LOCK_NB) != 0) throw std::runtime_error("attempt " + std::to_string(epoch) + " is taken");
+  reserve(folder.runner(epoch));  // a disk that fills up later does not keep the runner from saying how it ended
+  reserve(folder.exit_record(epoch));
 
   std::vector<std::string> command = {programs_.server, "run-attempt",         folder.root(),       std::to_string(epoch),
                                       "--engine",       programs_.engine,      "--mpirun",          programs_.mpirun,

@@ -85,15 +85,16 @@ void JobFolder::command(v1::Control::Command command, bool skip_checkpoint) cons
 
 void write_durably(const fs::path& path, std::string_view content) {
   const fs::path beside = path.string() + ".new";
-  const int file = ::open(beside.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
+  const int file = ::open(beside.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
   if (file < 0) fail("creating", beside);
+  const auto size = static_cast<off_t>(content.size());
   while (!content.empty()) {
     const ssize_t written = ::write(file, content.data(), content.size());
     if (written < 0 && errno == EINTR) continue;
     if (written < 0) break;
     content.remove_prefix(static_cast<std::size_t>(written));
   }
-  const bool whole = content.empty() && ::fsync(file) == 0;
+  const bool whole = content.empty() && ::ftruncate(file, size) == 0 && ::fsync(file) == 0;
   const int error = errno;
   ::close(file);
   if (!whole) {
@@ -103,6 +104,18 @@ void write_durably(const fs::path& path, std::string_view content) {
   }
   if (::rename(beside.c_str(), path.c_str()) != 0) fail("replacing", path);
   sync_folder(path.parent_path());
+}
+
+void reserve(const fs::path& path) {
+  const fs::path beside = path.string() + ".new";
+  const int file = ::open(beside.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
+  if (file < 0) fail("creating", beside);
+  const int error = ::posix_fallocate(file, 0, 4096);
+  ::close(file);
+  if (error == 0) return;
+  ::unlink(beside.c_str());
+  errno = error;
+  fail("finding room for", path);
 }
 
 void write_durably(const fs::path& path, const google::protobuf::Message& message) {

@@ -60,6 +60,8 @@ class DraftFolder {
 // std::system_error.
 void write_durably(const std::filesystem::path& path, std::string_view content);
 void write_durably(const std::filesystem::path& path, const google::protobuf::Message& message);  // text format
+// Room on the disk for one coming write_durably of at most 4096 bytes there. Throws std::system_error.
+void reserve(const std::filesystem::path& path);
 void sync_folder(const std::filesystem::path& folder);
 
 // False when the file is not there or is no such message.

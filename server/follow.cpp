@@ -52,17 +52,41 @@ void LogNotifier::wait(std::chrono::milliseconds most) {
   ::eventfd_read(poked_, &count);
 }
 
-void StateLog::add(const v1::Job& job) {
+void Feed::add(std::shared_ptr<const v1::Event> event) {
+  constexpr std::size_t most = 1024;  // whoever is further behind reads the log
+  const std::lock_guard guard(mutex_);
+  if (event->sequence() <= newest_) return;
+  if (event->sequence() != newest_ + 1) tail_.clear();
+  newest_ = event->sequence();
+  if (event->has_progress()) newest_progress_ = newest_;
+  tail_.push_back(std::move(event));
+  if (tail_.size() > most) tail_.pop_front();
+}
+
+void Feed::add(const v1::Job& job) {
   const std::lock_guard guard(mutex_);
   changes_.push_back(job);
 }
 
-std::size_t StateLog::size() const {
+void Feed::set_damaged() {
+  const std::lock_guard guard(mutex_);
+  damaged_ = true;
+}
+
+Feed::News Feed::behind(std::uint64_t sequence) const {
+  const std::lock_guard guard(mutex_);
+  News news{nullptr, newest_, newest_progress_, damaged_};
+  const std::uint64_t first = newest_ + 1 - tail_.size();
+  if (sequence + 1 >= first && sequence < newest_) news.event = tail_[sequence + 1 - first];
+  return news;
+}
+
+std::size_t Feed::changes() const {
   const std::lock_guard guard(mutex_);
   return changes_.size();
 }
 
-std::optional<v1::Job> StateLog::at(std::size_t index) const {
+std::optional<v1::Job> Feed::change(std::size_t index) const {
   const std::lock_guard guard(mutex_);
   if (index >= changes_.size()) return std::nullopt;
   return changes_[index];
@@ -75,12 +99,24 @@ v1::Event event_of(const LogRecord& record) {
   return event;
 }
 
-Cursor::Cursor(std::filesystem::path log, const v1::Job& job, std::shared_ptr<const StateLog> changes, std::uint64_t after)
-    : reader_(std::move(log)), changes_(std::move(changes)), next_change_(changes_->size()), sequence_(after), job_(job) {}
+Cursor::Cursor(std::filesystem::path log, const v1::Job& job, std::shared_ptr<const Feed> feed, std::uint64_t after)
+    : reader_(std::move(log)),
+      feed_(std::move(feed)),
+      next_change_(feed_->changes()),
+      sequence_(after),
+      history_(job.last_sequence()),
+      job_(job) {}
 
 v1::WatchJobResponse Cursor::answer() const {
   v1::WatchJobResponse response;
   response.set_sequence(sequence_);
+  return response;
+}
+
+v1::WatchJobResponse Cursor::job_answer(const v1::Job& job) {
+  job_ = job;
+  auto response = answer();
+  *response.mutable_job() = job_;
   return response;
 }
 
@@ -91,7 +127,7 @@ void Cursor::read_more() {
     skipped = false;
     const bool sound = reader_.read_up_to(most, [&](const LogRecord& record) {
       if (record.sequence > sequence_) {
-        events_.push_back(event_of(record));
+        events_.push_back(std::make_shared<const v1::Event>(event_of(record)));
       } else {
         skipped = true;
       }
@@ -102,31 +138,52 @@ void Cursor::read_more() {
   }
 }
 
-std::optional<v1::WatchJobResponse> Cursor::next() {
-  if (std::exchange(first_, false)) {
-    auto response = answer();
-    *response.mutable_job() = job_;
-    return response;
+// From what has been read, from the feed, from the log; nothing when there is none yet.
+std::shared_ptr<const v1::Event> Cursor::next_event() {
+  if (events_.empty()) {
+    auto news = feed_->behind(sequence_);
+    if (news.event) return news.event;
+    if (news.newest > sequence_) read_more();
+    if (events_.empty() && news.damaged) {
+      throw Refusal(Refused::log_damaged, "the event log is damaged behind event " + std::to_string(sequence_));
+    }
+    if (events_.empty()) return nullptr;
   }
-  const auto change = changes_->at(next_change_);
-  if (events_.empty()) read_more();
-  if (change && (change->last_sequence() <= sequence_ || events_.empty())) {
-    ++next_change_;
-    job_ = *change;
-    auto response = answer();
-    *response.mutable_job() = job_;
-    return response;
-  }
-  if (events_.empty()) return std::nullopt;
-  sequence_ = events_.front().sequence();
-  auto response = answer();
-  *response.mutable_event() = std::move(events_.front());
+  auto event = std::move(events_.front());
   events_.pop_front();
+  return event;
+}
+
+bool Cursor::is_overtaken(const v1::Event& event) const {
+  constexpr std::uint64_t far_behind = 64;  // events: more than any reader is that takes what it gets
+  if (!event.has_progress() || event.sequence() <= history_) return false;
+  const auto news = feed_->behind(sequence_);
+  return news.newest > sequence_ + far_behind && news.newest_progress > event.sequence();
+}
+
+std::optional<v1::WatchJobResponse> Cursor::next() {
+  if (std::exchange(first_, false)) return job_answer(job_);
+  if (!event_) event_ = next_event();
+  while (event_ && is_overtaken(*event_)) {
+    sequence_ = event_->sequence();
+    ++merged_;
+    event_ = next_event();
+  }
+  const auto change = feed_->change(next_change_);
+  if (change && (change->last_sequence() <= sequence_ || !event_)) {
+    ++next_change_;
+    return job_answer(*change);
+  }
+  if (!event_) return std::nullopt;
+  sequence_ = event_->sequence();
+  auto response = answer();
+  *response.mutable_event() = *std::exchange(event_, nullptr);
+  if (merged_ > 0) response.set_merged(std::exchange(merged_, 0));
   return response;
 }
 
 bool Cursor::has_ended() const {
-  return is_final(job_.state()) && events_.empty() && !changes_->at(next_change_);
+  return is_final(job_.state()) && !event_ && events_.empty() && !feed_->change(next_change_);
 }
 
 }  // namespace bedflow::server

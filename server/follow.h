@@ -37,24 +37,42 @@ class LogNotifier {
   std::map<std::filesystem::path, int> watched_;
 };
 
-// The changes of state of one job since somebody began to look, each with the newest event at that moment (last_sequence).
-class StateLog {
+// What the watchers of a job share: its newest events, so that a thousand of them cost one reading of the log, and its changes of
+// state since somebody began to look, each with the newest event at that moment (last_sequence).
+class Feed {
  public:
+  explicit Feed(std::uint64_t newest) : newest_(newest) {}  // events up to this one are in the log alone
+
+  void add(std::shared_ptr<const v1::Event> event);  // in order; what is known already is passed over
   void add(const v1::Job& job);
-  std::size_t size() const;
-  std::optional<v1::Job> at(std::size_t index) const;
+  void set_damaged();  // the log: no more events will come
+
+  struct News {
+    std::shared_ptr<const v1::Event> event;  // the next one, if it is still here
+    std::uint64_t newest = 0;                // event that there is
+    std::uint64_t newest_progress = 0;
+    bool damaged = false;
+  };
+  News behind(std::uint64_t sequence) const;
+  std::size_t changes() const;
+  std::optional<v1::Job> change(std::size_t index) const;
 
  private:
   mutable std::mutex mutex_;
+  std::deque<std::shared_ptr<const v1::Event>> tail_;  // up to newest_, without a gap
+  std::uint64_t newest_;
+  std::uint64_t newest_progress_ = 0;
+  bool damaged_ = false;
   std::vector<v1::Job> changes_;
 };
 
 // One watcher's place: events in order of their numbers, changes of state behind the event that was the newest when they
-// happened. The log is the queue: a slow reader costs a bounded number of events in memory and misses none.
+// happened. Feed and log are the queue: a slow reader costs a bounded number of events in memory and misses none, but for
+// progress that has been overtaken by newer progress while it did not read; what is left out is counted, and history never is.
 class Cursor {
  public:
   // job: as it is now, the first answer. after: the resume token.
-  Cursor(std::filesystem::path log, const v1::Job& job, std::shared_ptr<const StateLog> changes, std::uint64_t after);
+  Cursor(std::filesystem::path log, const v1::Job& job, std::shared_ptr<const Feed> feed, std::uint64_t after);
 
   // The next answer, if there is one. Throws Refusal(log_damaged).
   std::optional<v1::WatchJobResponse> next();
@@ -63,15 +81,21 @@ class Cursor {
 
  private:
   v1::WatchJobResponse answer() const;
+  v1::WatchJobResponse job_answer(const v1::Job& job);
+  std::shared_ptr<const v1::Event> next_event();
+  bool is_overtaken(const v1::Event& event) const;
   void read_more();
 
   LogReader reader_;
-  std::shared_ptr<const StateLog> changes_;
+  std::shared_ptr<const Feed> feed_;
   std::size_t next_change_;
   std::uint64_t sequence_;
-  v1::Job job_;  // newest that was given
+  std::uint64_t history_;  // the newest event when the watch began
+  v1::Job job_;            // newest that was given
   bool first_ = true;
-  std::deque<v1::Event> events_;
+  std::shared_ptr<const v1::Event> event_;               // read, not given yet
+  std::deque<std::shared_ptr<const v1::Event>> events_;  // from the log, behind that one
+  std::uint64_t merged_ = 0;                             // progress left out since the last answer
 };
 
 v1::Event event_of(const LogRecord& record);

@@ -1,8 +1,6 @@
-// What clients ask of the jobs. See supervise.cpp for what happens by itself.
+// What clients ask of the jobs that there are. See create.cpp for how they come, supervise.cpp for what happens by itself.
 #include "jobs.h"
 
-#include <google/protobuf/io/coded_stream.h>
-#include <google/protobuf/io/zero_copy_stream_impl_lite.h>
 #include <spdlog/spdlog.h>
 
 #include <charconv>
@@ -14,39 +12,27 @@
 #include "case_file.h"
 #include "refusal.h"
 #include "security.h"
-#include "submission.h"
 
 namespace bedflow::server {
 namespace {
 
 namespace fs = std::filesystem;
 
-std::int64_t now_nanos() {
-  return std::chrono::nanoseconds(std::chrono::system_clock::now().time_since_epoch()).count();
-}
-
 void require_job_id(const std::string& id) {
   if (!is_job_id(id))
     throw Refusal(Refused::bad_request, "'" + printable(id) + "' is not a job's id (j- and 12 hex digits)", "bedflow list");
-}
-
-// The same request gives the same bytes: maps in order.
-std::string content_of(v1::CreateJobRequest request) {
-  request.clear_request_id();
-  std::string bytes;
-  {
-    google::protobuf::io::StringOutputStream stream(&bytes);
-    google::protobuf::io::CodedOutputStream coded(&stream);
-    coded.SetSerializationDeterministic(true);
-    request.SerializeToCodedStream(&coded);
-  }
-  return bytes;
 }
 
 std::string steps_text(const std::vector<std::uint64_t>& steps) {
   std::string text;
   for (const auto step : steps) text += (text.empty() ? "" : ", ") + std::to_string(step);
   return text.empty() ? "it has none" : "it has those of step " + text;
+}
+
+}  // namespace
+
+std::int64_t now_nanos() {
+  return std::chrono::nanoseconds(std::chrono::system_clock::now().time_since_epoch()).count();
 }
 
 std::uint64_t existing_step(const JobFolder& folder, const std::string& id, std::optional<std::uint64_t> wanted) {
@@ -60,8 +46,6 @@ std::uint64_t existing_step(const JobFolder& folder, const std::string& id, std:
       "bedflow checkpoint list " + id);
 }
 
-}  // namespace
-
 JobRecord Jobs::record_of(const std::string& id) const {
   require_job_id(id);
   if (const auto live = live_.find(id); live != live_.end()) return live->second.record;
@@ -72,6 +56,7 @@ JobRecord Jobs::record_of(const std::string& id) const {
 v1::Job Jobs::view(const JobRecord& record) const {
   v1::Job job = record.job;
   job.set_folder(folder_of(job.id()).root());
+  job.set_retries(record.retries);
   if (const auto live = live_.find(job.id()); live != live_.end()) {
     const Attempt& attempt = live->second.attempt;
     if (attempt.progress().ByteSizeLong() > 0) *job.mutable_progress() = attempt.progress();
@@ -80,17 +65,19 @@ v1::Job Jobs::view(const JobRecord& record) const {
   return job;
 }
 
-std::shared_ptr<StateLog> Jobs::changes_of(const std::string& id) {
-  auto& weak = changes_[id];
-  auto log = weak.lock();
-  if (!log) weak = log = std::make_shared<StateLog>();
-  return log;
+std::shared_ptr<Feed> Jobs::feed_of(const v1::Job& job) {
+  std::erase_if(feeds_, [](const auto& entry) { return entry.second.expired(); });
+  auto& weak = feeds_[job.id()];
+  auto feed = weak.lock();
+  if (!feed) weak = feed = std::make_shared<Feed>(job.last_sequence());
+  return feed;
 }
 
 void Jobs::store(JobRecord& record, v1::JobState state, std::optional<Ending> why) {
   JobRecord changed = record;
   changed.job = view(record);
   changed.job.clear_folder();
+  if (state != v1::RECOVERING) changed.job.clear_next_attempt_unix_nanos();
   changed.job.set_state(state);
   changed.job.set_changed_unix_nanos(now_nanos());
   changed.job.clear_reason();
@@ -102,107 +89,12 @@ void Jobs::store(JobRecord& record, v1::JobState state, std::optional<Ending> wh
   catalogue_.update(changed);
   record = changed;
   spdlog::info("{} is {}{}", record.job.id(), state_word(state), why ? ": " + why->message : "");
-  if (const auto watched = changes_.find(record.job.id()); watched != changes_.end()) {
-    if (const auto log = watched->second.lock()) {
-      log->add(view(record));
-    } else {
-      changes_.erase(watched);
-    }
+  if (const auto watched = feeds_.find(record.job.id()); watched != feeds_.end()) {
+    if (const auto feed = watched->second.lock()) feed->add(view(record));
   }
   news_.insert(record.job.id());
   changed_.notify_all();
   notifier_.poke();
-}
-
-// ------------------------------------------------------------------------------------------------------ create
-
-std::optional<v1::CreateJobResponse> Jobs::earlier_answer(const v1::CreateJobRequest& request, const std::string& content) const {
-  if (request.request_id().empty()) return std::nullopt;
-  const auto earlier = catalogue_.find_request(request.request_id());
-  if (!earlier) return std::nullopt;
-  if (earlier->content != content) {
-    throw Refusal(
-        Refused::request_id_reused,
-        "request id " + request.request_id() + " has been used for " + earlier->job + " with another case or specification",
-        "bedflow get " + earlier->job);
-  }
-  v1::CreateJobResponse response;
-  *response.mutable_job() = view(record_of(earlier->job));
-  return response;
-}
-
-void Jobs::start_from(v1::CreateJobRequest& request, JobRecord& record) const {
-  const auto& source = request.start_from();
-  record_of(source.job());
-  const auto folder = folder_of(source.job());
-  record.from_step = existing_step(folder, source.job(), source.has_step() ? std::optional(source.step()) : std::nullopt);
-  record.job.set_start_from_job(source.job());
-  record.job.set_start_from_step(*record.from_step);
-  if (!request.has_case_() && !read_message(folder.case_file(), *request.mutable_case_())) {
-    throw Refusal(Refused::backend_error, "the case of " + source.job() + " cannot be read");
-  }
-}
-
-v1::CreateJobResponse Jobs::create(const v1::CreateJobRequest& asked) {
-  const std::string content = content_of(asked);
-  v1::CreateJobRequest request = asked;
-  JobRecord record;
-  if (request.has_request_id() && !is_request_id(request.request_id())) {
-    throw Refusal(Refused::bad_request,
-                  "request_id '" + printable(request.request_id()) + "' is not of the form [A-Za-z0-9-]{8,64}");
-  }
-  {
-    const std::lock_guard guard(mutex_);
-    if (auto earlier = earlier_answer(request, content)) return *earlier;
-    if (request.has_start_from()) start_from(request, record);
-  }
-  if (!request.has_case_())
-    throw Refusal(Refused::bad_request, "the request has neither a case nor start_from", "bedflow init mueller");
-  auto faults = check_case_fields(request.case_());
-  for (auto& fault : check_spec(request.spec(), settings_.slots)) faults.push_back(std::move(fault));
-  if (!faults.empty()) {
-    throw Refusal(Refused::invalid_case,
-                  std::to_string(faults.size()) + (faults.size() == 1 ? " fault" : " faults") + " in the case",
-                  "bedflow validate CASE", std::move(faults));
-  }
-  record.job.set_id(new_job_id());
-  const DraftFolder draft(settings_.data / "drafts" / record.job.id());
-  write_durably(draft.folder.case_file(), case_text(request.case_()));
-  v1::CreateJobResponse response;
-  *response.mutable_plan() = plan_of(settings_.programs.engine, draft.folder.case_file(), request.spec().ranks());
-  if (request.validate_only()) return response;
-  auto committed = commit(record, draft.folder, request, content);
-  *committed.mutable_plan() = response.plan();
-  return committed;
-}
-
-v1::CreateJobResponse Jobs::commit(JobRecord& record, const JobFolder& draft, const v1::CreateJobRequest& request,
-                                   const std::string& content) {
-  record.job.set_state(v1::PENDING);
-  record.job.set_case_name(request.case_().name());
-  *record.job.mutable_spec() = request.spec();
-  record.job.set_created_unix_nanos(now_nanos());
-  record.job.set_changed_unix_nanos(record.job.created_unix_nanos());
-  write_durably(draft.spec(), request.spec());
-  write_durably(draft.events(), std::string_view());  // empty: it can be watched from the start
-  if (record.from_step) {
-    const auto from = folder_of(record.job.start_from_job()).checkpoint(*record.from_step);
-    std::error_code failed;
-    fs::create_hard_link(from, draft.checkpoint(*record.from_step), failed);
-    if (failed) fs::copy_file(from, draft.checkpoint(*record.from_step));
-    sync_folder(draft.checkpoints());
-  }
-  const std::lock_guard guard(mutex_);
-  if (auto earlier = earlier_answer(request, content)) return *earlier;  // a retry has overtaken us
-  const auto folder = folder_of(record.job.id());
-  fs::rename(draft.root(), folder.root());
-  sync_folder(folder.root().parent_path());
-  catalogue_.insert(record, request.request_id(), content);
-  spdlog::info("{} is PENDING: case {}, {} ranks", record.job.id(), printable(record.job.case_name()), request.spec().ranks());
-  notifier_.poke();
-  v1::CreateJobResponse response;
-  *response.mutable_job() = view(record);
-  return response;
 }
 
 // ---------------------------------------------------------------------------------------------------- requests
@@ -269,7 +161,6 @@ v1::Job Jobs::request(const std::string& id, Request request, const char* wanted
     live->second.repeat_command = !live->second.attempt.has_started();
   }
   store(record, next);
-  not_before_.erase(id);
   return view(record);
 }
 
@@ -298,10 +189,7 @@ v1::Job Jobs::resume(const v1::ResumeJobRequest& request) {
       if (step > request.step()) fs::rename(path, path + ".superseded-" + std::to_string(record.job.epoch()));
     }
   }
-  if (request.ranks() > 0) {
-    record.job.mutable_spec()->set_ranks(request.ranks());
-    write_durably(folder.spec(), record.job.spec());
-  }
+  if (request.ranks() > 0) record.job.mutable_spec()->set_ranks(request.ranks());
   record.retries = 0;
   store(record, v1::PENDING);
   return view(record);
@@ -350,7 +238,7 @@ Cursor Jobs::watch(const std::string& id, std::uint64_t after, bool from_now) {
     throw Refusal(Refused::bad_request, "after_sequence is " + std::to_string(after) + "; the newest event of " + id + " is " +
                                             std::to_string(job.last_sequence()));
   }
-  return {folder_of(id).events(), job, changes_of(id), from_now ? job.last_sequence() : after};
+  return {folder_of(id).events(), job, feed_of(job), from_now ? job.last_sequence() : after};
 }
 
 v1::ServerInfo Jobs::info() {

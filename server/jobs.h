@@ -1,5 +1,5 @@
-// The jobs of a server: every change of state passes here. Calls come from any thread (jobs.cpp); one thread advances the
-// attempts and the queue (supervise.cpp). The catalogue says what a job is, its folder what its engine does.
+// The jobs of a server: every change of state passes here. Calls come from any thread (jobs.cpp, create.cpp); one thread advances
+// the attempts and the queue (supervise.cpp). The catalogue says what a job is, its folder what its engine does.
 //
 // The queue is first come, first served: the oldest waiting job starts as soon as its ranks fit into the free slots.
 #pragma once
@@ -18,6 +18,7 @@
 #include "catalogue.h"
 #include "executor.h"
 #include "follow.h"
+#include "planner.h"
 #include "states.h"
 
 namespace bedflow::server {
@@ -28,6 +29,11 @@ struct Settings {
   std::uint32_t slots = 4;  // ranks that may run at once
   std::chrono::seconds heartbeat_limit{30};
 };
+
+std::int64_t now_nanos();  // since the epoch of Unix
+
+// The checkpoint of the step, or the newest. Throws Refusal(checkpoint_not_found).
+std::uint64_t existing_step(const JobFolder& folder, const std::string& id, std::optional<std::uint64_t> wanted);
 
 class Jobs {
  public:
@@ -42,7 +48,8 @@ class Jobs {
   v1::Job resume(const v1::ResumeJobRequest& request);
   v1::Checkpoint create_checkpoint(const std::string& id, std::chrono::duration<double> limit);
   v1::ServerInfo info();
-  JobFolder folder(const std::string& id);  // of a job that exists
+  JobFolder folder(const std::string& id);    // of a job that exists; it may not have been laid out yet
+  v1::Case read_case(const std::string& id);  // the effective case
   Cursor watch(const std::string& id, std::uint64_t after, bool from_now);
 
   // The supervising thread: waits for news (0.2 s at most), then takes every attempt and the queue one step on. Returns the jobs
@@ -59,37 +66,40 @@ class Jobs {
     bool adopted = false;         // found, not started by this server
     bool repeat_command = false;  // a command came before the engine did
     bool heartbeat_lost = false;
+    std::optional<Ending> start_failure = {};                              // its runner could not be started
     std::optional<std::chrono::steady_clock::time_point> stopped_at = {};  // when the engine said so
   };
 
   JobFolder folder_of(const std::string& id) const { return JobFolder(settings_.data / "jobs" / id); }
   JobRecord record_of(const std::string& id) const;
   v1::Job view(const JobRecord& record) const;  // with what the attempt has done since
-  std::shared_ptr<StateLog> changes_of(const std::string& id);
+  std::shared_ptr<Feed> feed_of(const v1::Job& job);
   void store(JobRecord& record, v1::JobState state, std::optional<Ending> why = std::nullopt);
   JobRecord& require(JobRecord& record, Request request, const char* wanted) const;
   v1::Job request(const std::string& id, Request request, const char* wanted, v1::Control::Command command, bool skip_checkpoint);
 
   std::optional<v1::CreateJobResponse> earlier_answer(const v1::CreateJobRequest& request, const std::string& content) const;
   void start_from(v1::CreateJobRequest& request, JobRecord& record) const;
-  v1::CreateJobResponse commit(JobRecord& record, const JobFolder& draft, const v1::CreateJobRequest& request,
-                               const std::string& content);
+  v1::CreateJobResponse commit(JobRecord& record, const v1::CreateJobRequest& request, const std::string& content);
+  v1::Case case_of(const JobRecord& record) const;
+  void lay_out(const JobRecord& record) const;
 
   void adopt();
   void look_at(Live& live);
   void end(Live& live);
+  void store_end(JobRecord& record, Ending ending, bool is_nobodys_fault);
   void start_waiting();
   void start(JobRecord record);
 
   Settings settings_;
+  Planner planner_;
   LogNotifier notifier_;
   std::mutex mutex_;  // over all below
   std::condition_variable changed_;
   Catalogue catalogue_;
   LocalExecutor executor_;
   std::map<std::string, Live> live_;
-  std::map<std::string, std::weak_ptr<StateLog>> changes_;
-  std::map<std::string, std::chrono::steady_clock::time_point> not_before_;  // of jobs that are tried again
+  std::map<std::string, std::weak_ptr<Feed>> feeds_;  // of jobs that are watched
   std::set<std::string> news_;
   bool stopping_ = false;
 };

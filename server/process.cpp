@@ -95,12 +95,11 @@ std::vector<std::string> stat_fields(pid_t process) {
 pid_t launch(const Launch& what) {
   posix_spawn_file_actions_t files;
   posix_spawn_file_actions_init(&files);
-  posix_spawn_file_actions_addopen(&files, 0, "/dev/null", O_RDONLY, 0);
-  for (const auto& [from, to] : {std::pair{what.output, 1}, std::pair{what.error, 2}}) {
+  for (const auto& [from, to] : {std::pair{what.input, 0}, std::pair{what.output, 1}, std::pair{what.error, 2}}) {
     if (from >= 0) {
       posix_spawn_file_actions_adddup2(&files, from, to);
     } else {
-      posix_spawn_file_actions_addopen(&files, to, "/dev/null", O_WRONLY, 0);
+      posix_spawn_file_actions_addopen(&files, to, "/dev/null", to == 0 ? O_RDONLY : O_WRONLY, 0);
     }
   }
   if (what.kept >= 0) posix_spawn_file_actions_adddup2(&files, what.kept, 3);

@@ -12,10 +12,10 @@
 namespace bedflow::server {
 
 struct Launch {
-  std::vector<std::string> command;      // the program is looked for on PATH
-  std::vector<std::string> environment;  // NAME=value, in addition to ours
-  int output = -1, error = -1;           // descriptors; /dev/null if absent
-  int kept = -1;                         // a descriptor that the child has as number 3
+  std::vector<std::string> command;         // the program is looked for on PATH
+  std::vector<std::string> environment;     // NAME=value, in addition to ours
+  int input = -1, output = -1, error = -1;  // descriptors; /dev/null if absent
+  int kept = -1;                            // a descriptor that the child has as number 3
   bool new_session = false;
 };
 

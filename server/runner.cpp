@@ -77,6 +77,11 @@ int run_attempt(const RunnerOptions& options) {
                  epochs.back());
     return taken_code;
   }
+  // Also when the first runner and all that it started are gone: what they left behind is taken up by an attempt of its own.
+  if (std::filesystem::exists(folder.runner(options.epoch))) {
+    std::fprintf(stderr, "attempt %u of %s has been run already\n", options.epoch, options.folder.c_str());
+    return taken_code;
+  }
   const Launch engine = engine_launch(options);
   write_runner(folder, options, engine.command);
   int exit_code = cannot_start_code;

@@ -19,7 +19,7 @@ struct RunnerOptions {
   int lock_descriptor = -1;                // the attempt's lock, already held; taken here if absent
 };
 
-// The engine's exit code; 75 when the attempt is taken by another runner or a later attempt exists.
+// The engine's exit code; 75 when the attempt is or was run by another runner, or a later attempt exists.
 int run_attempt(const RunnerOptions& options);
 
 }  // namespace bedflow::server

@@ -121,7 +121,7 @@ JobService::Unary* JobService::CreateJob(Context* context, const v1::CreateJobRe
 JobService::Unary* JobService::GetJob(Context* context, const v1::GetJobRequest* request, v1::Job* response) {
   return answer(context, Pace::quick, [=, this] {
     *response = jobs_.get(request->id());
-    if (request->with_case()) read_message(jobs_.folder(request->id()).case_file(), *response->mutable_case_());
+    if (request->with_case()) *response->mutable_case_() = jobs_.read_case(request->id());
   });
 }
 

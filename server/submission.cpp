@@ -1,20 +1,13 @@
 #include "submission.h"
 
-#include <google/protobuf/text_format.h>
-
-#include <chrono>
 #include <cmath>
 #include <sstream>
 
 #include "case_file.h"
-#include "process.h"
-#include "refusal.h"
 #include "security.h"
 
 namespace bedflow::server {
 namespace {
-
-using namespace std::chrono_literals;
 
 class Faults {
  public:
@@ -35,16 +28,6 @@ class Faults {
  private:
   std::vector<v1::Fault> list_;
 };
-
-// A line of the engine's: "path: text".
-v1::Fault fault_of(const std::string& line) {
-  v1::Fault fault;
-  const auto colon = line.find(": ");
-  const bool has_path = colon != std::string::npos && colon > 0 && line.substr(0, colon).find(' ') == std::string::npos;
-  if (has_path) fault.set_path(line.substr(0, colon));
-  fault.set_text(has_path ? line.substr(colon + 2) : line);
-  return fault;
-}
 
 }  // namespace
 
@@ -83,24 +66,6 @@ std::vector<v1::Fault> check_case_fields(const v1::Case& value) {
   }
   for (const auto& fault : check_case(value)) faults.add(fault.path, fault.text);
   return std::move(faults).list();
-}
-
-v1::PlanReport plan_of(const std::filesystem::path& engine, const std::filesystem::path& case_file, std::uint32_t ranks) {
-  const auto answer = ask({engine, "--plan", case_file, "--ranks", std::to_string(ranks)}, 30s, 16 << 20);
-  if (answer.exit_code == v1::INVALID_CASE) {
-    std::vector<v1::Fault> faults;
-    std::istringstream lines(answer.error);
-    for (std::string line; std::getline(lines, line);) {
-      if (!line.empty()) faults.push_back(fault_of(line));
-    }
-    throw Refusal(Refused::invalid_case, "the engine cannot run this case", "bedflow validate CASE", std::move(faults));
-  }
-  v1::PlanReport plan;
-  if (answer.exit_code != 0 || !google::protobuf::TextFormat::ParseFromString(answer.output, &plan)) {
-    throw Refusal(Refused::backend_error, answer.timed_out ? "the engine gave no plan within 30 s"
-                                                           : "the engine gave no plan: " + printable(answer.error));
-  }
-  return plan;
 }
 
 }  // namespace bedflow::server

@@ -21,15 +21,29 @@ constexpr auto end_patience = 20ms;      // while an engine that has said its la
 constexpr auto longest_end = 15s;        // that this may take
 constexpr std::int64_t queue_look = 64;  // waiting jobs that are considered in one round
 
-// The first retry comes at once, the next after 2, 4, 8 … 60 s.
-Clock::duration pause_before(std::uint32_t retry) {
-  return retry <= 1 ? 0s : std::min<std::chrono::seconds>(1s * (1 << std::min(retry - 1, 6U)), 60s);
+constexpr auto longest_pause = 60s;
+
+// After a process that died the first retry comes at once; what may need a while to mend gets a second. The next come after 2, 4,
+// 8 … 60 s.
+std::chrono::seconds pause_before(std::uint32_t retry, v1::StopReason reason) {
+  const bool mends_slowly = reason == v1::BACKEND_ERROR || reason == v1::NODE_LOST || reason == v1::HEARTBEAT_LOST;
+  if (retry <= 1) return mends_slowly ? 1s : 0s;
+  return std::min<std::chrono::seconds>(1s * (1 << std::min(retry - 1, 6U)), longest_pause);
+}
+
+// A clock that was set back must not make it wait for longer than any pause is.
+bool is_due(const v1::Job& job) {
+  const auto left = std::chrono::nanoseconds(job.next_attempt_unix_nanos() - now_nanos());
+  return left <= 0s || left > longest_pause;
 }
 
 }  // namespace
 
 Jobs::Jobs(Settings settings)
-    : settings_(std::move(settings)), catalogue_(settings_.data / "catalogue.sqlite"), executor_(settings_.programs) {
+    : settings_(std::move(settings)),
+      planner_(settings_.programs.engine),
+      catalogue_(settings_.data / "catalogue.sqlite"),
+      executor_(settings_.programs) {
   std::filesystem::create_directories(settings_.data / "jobs");
   std::filesystem::remove_all(settings_.data / "drafts");  // submissions that were never acknowledged
   std::filesystem::create_directories(settings_.data / "drafts");
@@ -73,7 +87,8 @@ std::set<std::string> Jobs::advance() {
 
 void Jobs::look_at(Live& live) {
   Attempt& attempt = live.attempt;
-  if (attempt.look()) news_.insert(live.record.job.id());
+  const auto feed = feeds_.find(live.record.job.id());
+  if (attempt.look(feed == feeds_.end() ? nullptr : feed->second.lock())) news_.insert(live.record.job.id());
   const auto state = live.record.job.state();
   if (attempt.has_started() && state == v1::STARTING) store(live.record, v1::RUNNING);
   if (attempt.has_started() && std::exchange(live.repeat_command, false)) {
@@ -83,7 +98,7 @@ void Jobs::look_at(Live& live) {
   }
   if (attempt.stopped() && !live.stopped_at) live.stopped_at = Clock::now();
   if (live.stopped_at && Clock::now() - *live.stopped_at > longest_end) executor_.kill(attempt.folder(), attempt.epoch());
-  if (!attempt.stopped() && attempt.silence() > settings_.heartbeat_limit) {
+  if (!attempt.stopped() && !live.start_failure && attempt.silence() > settings_.heartbeat_limit) {
     live.heartbeat_lost = true;
     executor_.kill(attempt.folder(), attempt.epoch());
   }
@@ -93,33 +108,37 @@ void Jobs::end(Live& live) {
   const Attempt& attempt = live.attempt;
   const JobFolder& folder = attempt.folder();
   JobRecord changed = live.record;
-  Ending ending = attempt.ending();
+  Ending ending = live.start_failure ? *live.start_failure : attempt.ending();
   if (!attempt.stopped() && live.heartbeat_lost) {
     ending = {v1::HEARTBEAT_LOST, "no sign of life for " + std::to_string(settings_.heartbeat_limit.count()) + " s"};
   }
   // A server that died between its commit and the start of the runner: nobody's fault.
   const bool never_began = live.adopted && !std::filesystem::exists(folder.runner(attempt.epoch()));
-  const bool may_retry = never_began || changed.retries < changed.job.spec().retries().most();
-  const auto next = after_attempt(changed.job.state(), ending.reason, may_retry);
   if (attempt.has_started()) changed.from_step.reset();  // the checkpoint was good; from now on the newest is
-  if (next == v1::RECOVERING && !never_began) {
-    ++changed.retries;
-    not_before_[changed.job.id()] = Clock::now() + pause_before(changed.retries);
-  }
-  store(changed, next, ending);
+  if (attempt.has_gone_on()) changed.retries = 0;        // a week has many faults; each brings the job further
+  store_end(changed, ending, never_began);
   live.record = changed;
   notifier_.remove(folder.events());
+}
+
+void Jobs::store_end(JobRecord& record, Ending ending, bool is_nobodys_fault) {
+  const bool may_retry = is_nobodys_fault || record.retries < record.job.spec().retries().most();
+  const auto next = after_attempt(record.job.state(), ending.reason, may_retry);
+  if (next == v1::RECOVERING && !is_nobodys_fault) {
+    const auto pause = pause_before(++record.retries, ending.reason);
+    record.job.set_next_attempt_unix_nanos(now_nanos() + std::chrono::nanoseconds(pause).count());
+    if (pause > 0s) ending.message += "; tried again in " + std::to_string(pause.count()) + " s";
+  }
+  store(record, next, ending);
 }
 
 void Jobs::start_waiting() {
   std::uint32_t used = 0;
   for (const auto& [id, live] : live_) used += live.record.job.spec().ranks();
   for (auto& record : catalogue_.in_states({v1::PENDING, v1::RECOVERING}, queue_look)) {
-    const auto pause = not_before_.find(record.job.id());
-    if (pause != not_before_.end() && Clock::now() < pause->second) continue;
+    if (!is_due(record.job)) continue;
     used += record.job.spec().ranks();
     if (used > settings_.slots) return;
-    not_before_.erase(record.job.id());
     start(std::move(record));
   }
 }
@@ -134,16 +153,16 @@ void Jobs::start(JobRecord record) {
   auto& live = live_.emplace(id, Live{std::move(record), Attempt(folder, epoch)}).first->second;
   live.attempt.look();
   try {
+    lay_out(live.record);
     folder.command(v1::Control::NONE);  // commands to the attempt before are over
     executor_.start(folder, epoch, live.record.job.spec().ranks(), live.record.from_step);
     notifier_.add(folder.events());
   } catch (const std::exception& failure) {
     spdlog::error("{} cannot be started: {}", id, failure.what());
-    const bool may_retry = live.record.retries < live.record.job.spec().retries().most();
-    ++live.record.retries;
-    not_before_[id] = Clock::now() + std::max<Clock::duration>(pause_before(live.record.retries), 1s);
-    store(live.record, after_attempt(v1::STARTING, v1::BACKEND_ERROR, may_retry), Ending{v1::BACKEND_ERROR, failure.what()});
-    live_.erase(id);
+    const auto* system = dynamic_cast<const std::system_error*>(&failure);
+    const bool is_full = system && system->code() == std::errc::no_space_on_device;
+    live.start_failure = {is_full ? v1::DISK_FULL : v1::BACKEND_ERROR, failure.what()};
+    notifier_.poke();  // the next round ends it
   }
 }
 

@@ -305,15 +305,25 @@ Scene make_scene(const v1::Case& from) {
 
 }  // namespace
 
-Scene read_scene(const std::filesystem::path& case_file) {
-  const CaseRead read = read_case_file(case_file);
+namespace {
+
+Scene checked_scene(const CaseRead& read, const std::string& where) {
   if (!read.faults.empty()) {
-    std::string all =
-        std::to_string(read.faults.size()) + (read.faults.size() == 1 ? " fault" : " faults") + " in " + case_file.string();
+    std::string all = std::to_string(read.faults.size()) + (read.faults.size() == 1 ? " fault" : " faults") + " in " + where;
     for (const CaseFault& fault : read.faults) all += "\n  " + fault.path + ": " + fault.text;
     throw Stop(Reason::invalid_case, all);
   }
   return make_scene(read.value);
+}
+
+}  // namespace
+
+Scene read_scene(const std::filesystem::path& case_file) {
+  return checked_scene(read_case_file(case_file), case_file.string());
+}
+
+Scene scene_of(const std::string& case_text) {
+  return checked_scene(read_case(case_text), "the case");
 }
 
 }  // namespace bedflow

@@ -42,4 +42,13 @@ std::optional<std::uint32_t> attempt_of_partial(const std::filesystem::path& pat
   return number_between<std::uint32_t>(std::string_view(name).substr(dot), ".epoch", ".partial");
 }
 
+std::uint64_t newest_attempt(const std::filesystem::path& job) {
+  std::uint64_t newest = 0;
+  std::error_code none;
+  for (const auto& entry : std::filesystem::directory_iterator(job / "attempts", none)) {
+    newest = std::max(newest, number_between<std::uint64_t>(entry.path().filename().string(), "", "").value_or(0));
+  }
+  return newest;
+}
+
 }  // namespace bedflow

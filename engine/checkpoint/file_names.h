@@ -15,4 +15,7 @@ std::string partial_name(std::uint64_t step, std::uint32_t epoch);
 std::optional<std::uint64_t> step_of_checkpoint(const std::filesystem::path& path);
 std::optional<std::uint32_t> attempt_of_partial(const std::filesystem::path& path);
 
+// The highest number among the names in attempts/ of a job's folder; 0: there is none.
+std::uint64_t newest_attempt(const std::filesystem::path& job);
+
 }  // namespace bedflow

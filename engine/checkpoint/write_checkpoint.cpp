@@ -1,6 +1,5 @@
 // Writing: layout -> room -> slabs -> fsync -> manifest and seal -> fsync -> verify -> epoch -> rename -> fsync of the folder.
 #include <algorithm>
-#include <charconv>
 #include <cstring>
 #include <optional>
 
@@ -71,21 +70,8 @@ void read_back(const Comm& comm, const fs::path& path, const Manifest& manifest)
   if (!faults.empty()) throw Stop(Reason::internal, path.string() + " does not read back as it was written: " + faults.front());
 }
 
-// Highest number among the names in <job>/attempts.
-std::uint64_t newest_attempt(const fs::path& folder) {
-  std::uint64_t newest = 0;
-  std::error_code none;
-  for (const auto& entry : fs::directory_iterator(folder.parent_path() / "attempts", none)) {
-    const std::string name = entry.path().filename();
-    std::uint64_t number = 0;
-    const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), number);
-    if (error == std::errc() && end == name.data() + name.size()) newest = std::max(newest, number);
-  }
-  return newest;
-}
-
 void check_epoch(const fs::path& folder, std::uint32_t epoch) {
-  const std::uint64_t newest = epoch == 0 ? 0 : newest_attempt(folder);
+  const std::uint64_t newest = epoch == 0 ? 0 : newest_attempt(folder.parent_path());
   if (newest > epoch) {
     throw Stop(Reason::stale_epoch, "attempt " + std::to_string(newest) + " has taken this job over from attempt " +
                                         std::to_string(epoch) + ": no checkpoint was left behind");

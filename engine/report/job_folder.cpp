@@ -8,12 +8,16 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <deque>
 #include <fstream>
 #include <sstream>
 #include <system_error>
+#include <utility>
+#include <variant>
 
 #include "bedflow/v1/job.pb.h"
 #include "bedflow/v1/results.pb.h"
+#include "checkpoint/file_names.h"
 #include "record_log.h"
 
 namespace bedflow {
@@ -63,17 +67,42 @@ RunPolicy read_policy(const std::filesystem::path& folder) {
           .checkpoint_simulated = checkpoints.every_simulated_seconds(),
           .checkpoint_wall = checkpoints.every_wall_seconds(),
           .keep = static_cast<int>(std::max(2u, checkpoints.keep())),
+          .go_on_when_full = checkpoints.when_disk_full() == v1::CheckpointPolicy::GO_ON,
           .wall_limit = spec.wall_limit_seconds()};
 }
 
+// The two logs, and what waits for room on the disk: in order, events without their numbers yet.
 struct JobFolder::Logs {
   LogWriter events, statistics;
+  std::deque<std::variant<v1::Event, v1::StatisticsRecord>> waiting{};
+  std::size_t waiting_bytes = 0;
+
   explicit Logs(const std::filesystem::path& folder) : events(folder / "events.log"), statistics(folder / "statistics.log") {}
-  void append_statistics(const v1::StatisticsRecord& record) { statistics.append(1, record.SerializeAsString()); }
+
+  void write(v1::Event event) {
+    event.set_sequence(events.next_sequence());
+    events.append(static_cast<std::uint32_t>(event.what_case()), event.SerializeAsString());
+  }
+  void write(const v1::StatisticsRecord& record) { statistics.append(1, record.SerializeAsString()); }
+  void write_waiting() {
+    for (; !waiting.empty(); waiting.pop_front()) {
+      std::visit([this](const auto& record) { write(record); }, waiting.front());
+    }
+    waiting_bytes = 0;
+  }
+  void keep(const v1::StatisticsRecord& record) {
+    waiting_bytes += record.ByteSizeLong() + sizeof(record);
+    waiting.emplace_back(record);
+  }
+  void keep(const v1::Event& event) {
+    if (event.has_progress()) return;  // not worth the memory: the next is as good
+    waiting_bytes += event.ByteSizeLong() + sizeof(event);
+    waiting.emplace_back(event);
+  }
 };
 
-JobFolder::JobFolder(const Comm& comm, std::filesystem::path folder, std::uint32_t epoch)
-    : path_(std::move(folder)), epoch_(epoch) {
+JobFolder::JobFolder(const Comm& comm, std::filesystem::path folder, std::uint32_t epoch, bool go_on_when_full)
+    : path_(std::move(folder)), epoch_(epoch), go_on_when_full_(go_on_when_full) {
   if (!comm.root()) return;
   try {
     logs_ = std::make_unique<Logs>(path_);
@@ -84,85 +113,97 @@ JobFolder::JobFolder(const Comm& comm, std::filesystem::path folder, std::uint32
 }
 JobFolder::~JobFolder() = default;
 
-template <class Write>
-void JobFolder::append(Write write) {
-  if (!logs_) return;
-  try {
-    write(*logs_);
-  } catch (const std::system_error& error) {
-    failure_.note(error.code().value() == ENOSPC || error.code().value() == EDQUOT ? Reason::disk_full : Reason::internal,
-                  "the job folder cannot be written: " + std::string(error.what()) +
-                      "; make room on the disk, then resume the job: checkpoints are kept");
-  }
-}
-
 namespace {
 
-void append_event(LogWriter& log, std::uint32_t epoch, v1::Event event) {
-  const auto now = std::chrono::system_clock::now().time_since_epoch();
-  event.set_sequence(log.next_sequence());
-  event.set_unix_nanos(std::chrono::duration_cast<std::chrono::nanoseconds>(now).count());
-  event.set_epoch(epoch);
-  log.append(static_cast<std::uint32_t>(event.what_case()), event.SerializeAsString());
+constexpr std::size_t most_waiting_bytes = 16 << 20;
+
+bool is_full(const std::system_error& error) {
+  return error.code().value() == ENOSPC || error.code().value() == EDQUOT;
 }
 
 }  // namespace
 
+void JobFolder::note(const std::system_error& error) {
+  if (is_full(error) && go_on_when_full_ && logs_->waiting_bytes <= most_waiting_bytes) return;
+  failure_.note(is_full(error) ? Reason::disk_full : Reason::internal,
+                "the job folder cannot be written: " + std::string(error.what()) +
+                    "; make room on the disk, then resume the job: checkpoints are kept");
+}
+
+template <class Record>
+void JobFolder::append(const Record& record) {
+  if (!logs_) return;
+  try {
+    logs_->write_waiting();
+    logs_->write(record);
+  } catch (const std::system_error& error) {
+    if (is_full(error)) logs_->keep(record);
+    note(error);
+  }
+}
+
+void JobFolder::append_event(v1::Event event) {
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  event.set_unix_nanos(std::chrono::duration_cast<std::chrono::nanoseconds>(now).count());
+  event.set_epoch(epoch_);
+  append(event);
+}
+
+bool JobFolder::has_unwritten() const {
+  return logs_ && !logs_->waiting.empty();
+}
+
+void JobFolder::leave() {
+  logs_.reset();
+}
+
 void JobFolder::started(int ranks, std::uint64_t step, double time, double end_time, const std::string& from_checkpoint,
                         const std::string& plan) {
-  append([&](Logs& logs) {
-    v1::Event event;
-    v1::Started& started = *event.mutable_started();
-    started.set_ranks(static_cast<std::uint32_t>(ranks));
-    started.set_step(step);
-    started.set_time(time);
-    started.set_end_time(end_time);
-    if (!from_checkpoint.empty()) started.set_from_checkpoint(from_checkpoint);
-    started.set_plan(plan);
-    started.set_version(BEDFLOW_VERSION);
-    append_event(logs.events, epoch_, std::move(event));
-  });
+  v1::Event event;
+  v1::Started& started = *event.mutable_started();
+  started.set_ranks(static_cast<std::uint32_t>(ranks));
+  started.set_step(step);
+  started.set_time(time);
+  started.set_end_time(end_time);
+  if (!from_checkpoint.empty()) started.set_from_checkpoint(from_checkpoint);
+  started.set_plan(plan);
+  started.set_version(BEDFLOW_VERSION);
+  append_event(std::move(event));
 }
 
 void JobFolder::progress(const ProgressReport& now) {
-  append([&](Logs& logs) {
-    v1::Event event;
-    v1::Progress& progress = *event.mutable_progress();
-    progress.set_step(now.step);
-    progress.set_time(now.time);
-    progress.set_step_size(now.step_size);
-    progress.set_end_time(now.end_time);
-    progress.set_wall_seconds(now.wall_seconds);
-    if (now.eta_seconds >= 0) progress.set_eta_seconds(now.eta_seconds);
-    progress.set_substeps(now.substeps);
-    progress.set_particles(now.particles);
-    progress.set_gas_iterations(static_cast<std::uint32_t>(now.gas_iterations));
-    progress.set_phase(now.phase);
-    append_event(logs.events, epoch_, std::move(event));
-  });
+  v1::Event event;
+  v1::Progress& progress = *event.mutable_progress();
+  progress.set_step(now.step);
+  progress.set_time(now.time);
+  progress.set_step_size(now.step_size);
+  progress.set_end_time(now.end_time);
+  progress.set_wall_seconds(now.wall_seconds);
+  if (now.eta_seconds >= 0) progress.set_eta_seconds(now.eta_seconds);
+  progress.set_substeps(now.substeps);
+  progress.set_particles(now.particles);
+  progress.set_gas_iterations(static_cast<std::uint32_t>(now.gas_iterations));
+  progress.set_phase(now.phase);
+  append_event(std::move(event));
 }
 
 void JobFolder::checkpoint(const std::string& file, std::uint64_t step, double time, std::uint64_t bytes, double seconds) {
-  append([&](Logs& logs) {
-    v1::Event event;
-    v1::CheckpointWritten& written = *event.mutable_checkpoint();
-    written.set_file(file);
-    written.set_step(step);
-    written.set_time(time);
-    written.set_bytes(bytes);
-    written.set_seconds(seconds);
-    append_event(logs.events, epoch_, std::move(event));
-    logs.events.sync();
-  });
+  v1::Event event;
+  v1::CheckpointWritten& written = *event.mutable_checkpoint();
+  written.set_file(file);
+  written.set_step(step);
+  written.set_time(time);
+  written.set_bytes(bytes);
+  written.set_seconds(seconds);
+  append_event(std::move(event));
+  sync();
 }
 
 void JobFolder::log_line(int severity, const std::string& text) {
-  append([&](Logs& logs) {
-    v1::Event event;
-    event.mutable_log()->set_severity(static_cast<v1::LogLine::Severity>(severity));
-    event.mutable_log()->set_text(text);
-    append_event(logs.events, epoch_, std::move(event));
-  });
+  v1::Event event;
+  event.mutable_log()->set_severity(static_cast<v1::LogLine::Severity>(severity));
+  event.mutable_log()->set_text(text);
+  append_event(std::move(event));
 }
 void JobFolder::info(const std::string& text) {
   log_line(v1::LogLine::INFO, text);
@@ -175,78 +216,81 @@ void JobFolder::error(const std::string& text) {
 }
 
 void JobFolder::stopped(Reason reason, const std::string& message, std::uint64_t step, double time) {
-  append([&](Logs& logs) {
-    v1::Event event;
-    v1::Stopped& stopped = *event.mutable_stopped();
-    stopped.set_reason(static_cast<v1::StopReason>(reason));
-    stopped.set_message(message);
-    stopped.set_step(step);
-    stopped.set_time(time);
-    append_event(logs.events, epoch_, std::move(event));
-    logs.events.sync();
-    logs.statistics.sync();
-  });
+  v1::Event event;
+  v1::Stopped& stopped = *event.mutable_stopped();
+  stopped.set_reason(static_cast<v1::StopReason>(reason));
+  stopped.set_message(message);
+  stopped.set_step(step);
+  stopped.set_time(time);
+  append_event(std::move(event));
+  sync();
 }
 
 void JobFolder::statistics_schema(const std::vector<MonitorReport>& monitors) {
-  append([&](Logs& logs) {
-    v1::StatisticsRecord record;
-    for (const MonitorReport& monitor : monitors) {
-      v1::MonitorSchema& schema = *record.mutable_schema()->add_monitors();
-      schema.set_name(monitor.name);
-      schema.set_unit(monitor.unit);
-      schema.set_meaning(monitor.meaning);
-      schema.set_is_profile(monitor.profile);
-      schema.mutable_places()->Assign(monitor.places.begin(), monitor.places.end());
-      schema.set_averaging_start(monitor.averaging_start);
-      schema.set_averaging_bin(monitor.averaging_bin);
-      schema.set_averaging_bins(static_cast<std::uint32_t>(monitor.averaging_bins));
-    }
-    logs.append_statistics(record);
-  });
+  v1::StatisticsRecord record;
+  for (const MonitorReport& monitor : monitors) {
+    v1::MonitorSchema& schema = *record.mutable_schema()->add_monitors();
+    schema.set_name(monitor.name);
+    schema.set_unit(monitor.unit);
+    schema.set_meaning(monitor.meaning);
+    schema.set_is_profile(monitor.profile);
+    schema.mutable_places()->Assign(monitor.places.begin(), monitor.places.end());
+    schema.set_averaging_start(monitor.averaging_start);
+    schema.set_averaging_bin(monitor.averaging_bin);
+    schema.set_averaging_bins(static_cast<std::uint32_t>(monitor.averaging_bins));
+  }
+  append(record);
 }
 void JobFolder::statistics_resumed(std::uint64_t step) {
-  append([&](Logs& logs) {
-    v1::StatisticsRecord record;
-    record.mutable_resumed()->set_step(step);
-    logs.append_statistics(record);
-  });
+  v1::StatisticsRecord record;
+  record.mutable_resumed()->set_step(step);
+  append(record);
 }
 void JobFolder::sample(std::size_t monitor, std::uint64_t step, double time, double value) {
-  append([&](Logs& logs) {
-    v1::StatisticsRecord record;
-    v1::Sample& sample = *record.mutable_sample();
-    sample.set_monitor(static_cast<std::uint32_t>(monitor));
-    sample.set_step(step);
-    sample.set_time(time);
-    sample.set_value(value);
-    logs.append_statistics(record);
-  });
+  v1::StatisticsRecord record;
+  v1::Sample& sample = *record.mutable_sample();
+  sample.set_monitor(static_cast<std::uint32_t>(monitor));
+  sample.set_step(step);
+  sample.set_time(time);
+  sample.set_value(value);
+  append(record);
 }
 void JobFolder::bin(std::size_t monitor, int bin, std::uint64_t step, std::span<const double> mean,
                     std::span<const double> deviation) {
-  append([&](Logs& logs) {
-    v1::StatisticsRecord record;
-    v1::BinClosed& closed = *record.mutable_bin();
-    closed.set_monitor(static_cast<std::uint32_t>(monitor));
-    closed.set_bin(static_cast<std::uint32_t>(bin));
-    closed.set_step(step);
-    closed.mutable_mean()->Assign(mean.begin(), mean.end());
-    closed.mutable_deviation()->Assign(deviation.begin(), deviation.end());
-    logs.append_statistics(record);
-  });
+  v1::StatisticsRecord record;
+  v1::BinClosed& closed = *record.mutable_bin();
+  closed.set_monitor(static_cast<std::uint32_t>(monitor));
+  closed.set_bin(static_cast<std::uint32_t>(bin));
+  closed.set_step(step);
+  closed.mutable_mean()->Assign(mean.begin(), mean.end());
+  closed.mutable_deviation()->Assign(deviation.begin(), deviation.end());
+  append(record);
 }
 void JobFolder::sync() {
-  append([](Logs& logs) {
-    logs.events.sync();
-    logs.statistics.sync();
-  });
+  if (!logs_) return;
+  try {
+    logs_->write_waiting();
+    logs_->events.sync();
+    logs_->statistics.sync();
+  } catch (const std::system_error& error) {
+    note(error);
+  }
+}
+
+void JobFolder::look_for_later_attempt() {
+  const std::uint64_t newest = epoch_ == 0 ? 0 : newest_attempt(path_);
+  if (newest <= epoch_) return;
+  failure_ = {Reason::stale_epoch,
+              "attempt " + std::to_string(newest) + " has taken this job over from attempt " + std::to_string(epoch_)};
+  leave();
 }
 
 Command JobFolder::poll() {
   const auto now = std::chrono::steady_clock::now();
   if (!logs_ || now - last_poll_ < std::chrono::milliseconds(100)) return Command::none;
   last_poll_ = now;
+  look_for_later_attempt();
+  if (!logs_) return Command::none;
   const int heartbeat = open((path_ / "heartbeat").c_str(), O_WRONLY | O_CREAT, 0644);
   if (heartbeat >= 0) {
     futimens(heartbeat, nullptr);

@@ -8,6 +8,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "base/stop.h"
@@ -15,13 +16,18 @@
 
 namespace bedflow {
 
+namespace v1 {
+class Event;
+}
+
 // When checkpoints are written, and how long the run may take. Zero: never, no limit.
 struct RunPolicy {
   std::uint64_t checkpoint_steps = 0;
   double checkpoint_simulated = 0;  // s
   double checkpoint_wall = 600;     // s
   int keep = 2;
-  double wall_limit = 0;  // s
+  bool go_on_when_full = false;  // a full disk stops the run otherwise
+  double wall_limit = 0;         // s
 };
 // From job.txtpb; the defaults of the schema if there is none. Throws Stop(invalid_case) naming line and column.
 RunPolicy read_policy(const std::filesystem::path& folder);
@@ -45,10 +51,12 @@ struct MonitorReport {
   int averaging_bins = 0;
 };
 
-// Rank 0 writes; on the other ranks every call does nothing. A file that cannot be written is kept as failure(), to be voted on.
+// Rank 0 writes; on the other ranks every call does nothing. A file that cannot be written is kept as failure(), to be voted on,
+// and so is a later attempt at the job: from then on nothing is written, the folder is the other's.
 class JobFolder {
  public:
-  JobFolder(const Comm& comm, std::filesystem::path folder, std::uint32_t epoch);
+  // go_on_when_full: what does not fit on the disk waits in memory, up to a bound, and is written when there is room.
+  JobFolder(const Comm& comm, std::filesystem::path folder, std::uint32_t epoch, bool go_on_when_full = false);
   ~JobFolder();
 
   const std::filesystem::path& path() const { return path_; }
@@ -66,7 +74,9 @@ class JobFolder {
   void statistics_resumed(std::uint64_t step);
   void sample(std::size_t monitor, std::uint64_t step, double time, double value);
   void bin(std::size_t monitor, int bin, std::uint64_t step, std::span<const double> mean, std::span<const double> deviation);
-  void sync();  // both logs to the disk: before a checkpoint is told of
+  void sync();                 // both logs to the disk: before a checkpoint is told of
+  bool has_unwritten() const;  // something waits for room on the disk
+  void leave();                // writes nothing any more: the folder is another attempt's
 
   // Touches the heartbeat and takes control.txtpb (renames it to control.obeyed.txtpb), at most every 100 ms.
   Command poll();
@@ -75,12 +85,16 @@ class JobFolder {
 
  private:
   struct Logs;
-  template <class Write>
-  void append(Write write);
+  template <class Record>
+  void append(const Record& record);
+  void append_event(v1::Event event);
+  void note(const std::system_error& error);
+  void look_for_later_attempt();
   void log_line(int severity, const std::string& text);
 
   std::filesystem::path path_;
   std::uint32_t epoch_;
+  bool go_on_when_full_;
   std::unique_ptr<Logs> logs_;  // rank 0 only
   Failure failure_;
   std::chrono::steady_clock::time_point last_poll_{};

@@ -2,7 +2,8 @@
 // the case's description, e.g. "step_ms=2 die_at=40 epoch=1":
 //   step_ms=N     wall time of a step            die_at=S      kill -9 itself at step S
 //   diverge_at=S  stop with DIVERGED             freeze_at=S   live on without heartbeat or steps
-//   epoch=N       the mishap happens in attempt N only        refuse=PATH   --plan finds a fault there
+//   epoch=N       the mishap happens in attempt N only        refuse=PATH   the plan finds a fault there
+//   plan=dies     kill -9 itself over the plan
 // A checkpoint's content is "good <step>"; anything else is corrupt.
 #include <fcntl.h>
 #include <google/protobuf/text_format.h>
@@ -202,18 +203,31 @@ class Engine {
   std::uint64_t obeyed_ = 0;
 };
 
-int plan(const fs::path& case_file) {
-  const auto scene = read<v1::Case>(case_file);
+// As `bedflow-engine --plans` (engine/report/plan_report.h).
+std::pair<int, std::string> plan(const v1::Case& scene) {
   if (const auto path = option(scene, "refuse", ""); !path.empty()) {
-    std::cerr << path << ": refused as the case asked\n";
-    return v1::INVALID_CASE;
+    return {v1::INVALID_CASE, path + ": refused as the case asked\n"};
   }
+  if (option(scene, "plan", "") == "dies") ::kill(::getpid(), SIGKILL);
   v1::PlanReport report;
   report.set_steps(static_cast<std::uint64_t>(scene.time().end() / scene.time().step()));
   report.set_text("a plan of " + scene.name());
   std::string text;
   google::protobuf::TextFormat::PrintToString(report, &text);
-  std::cout << text;
+  return {0, text};
+}
+
+int answer_plans() {
+  int ranks = 0;
+  std::size_t bytes = 0;
+  while (std::cin >> ranks >> bytes && std::cin.get() == '\n') {
+    std::string text(bytes, '\0');
+    std::cin.read(text.data(), static_cast<std::streamsize>(bytes));
+    v1::Case scene;
+    google::protobuf::TextFormat::ParseFromString(text, &scene);
+    const auto [code, answer] = plan(scene);
+    std::cout << code << ' ' << answer.size() << '\n' << answer << std::flush;
+  }
   return 0;
 }
 
@@ -237,7 +251,7 @@ int main(int argc, char** argv) {
     const auto place = std::find(words.begin(), words.end(), name);
     return place == words.end() || place + 1 == words.end() ? std::nullopt : std::optional(place[1]);
   };
-  if (const auto file = value("--plan")) return plan(*file);
+  if (words.at(0) == "--plans") return answer_plans();
   if (const auto file = value("--snapshot")) return snapshot(*file);
   // Under mpirun the other ranks only have to be there.
   if (const char* rank = std::getenv("OMPI_COMM_WORLD_RANK"); rank && std::string(rank) != "0") return 0;

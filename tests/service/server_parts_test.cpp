@@ -114,9 +114,10 @@ TEST(States, OnlyWhatIsNotTheCasesFaultIsRetried) {
     EXPECT_EQ(after_attempt(v1::SUSPENDING, reason, true), v1::STATE_SUSPENDED) << reason;
   }
   for (const auto reason : {v1::INVALID_CASE, v1::DIVERGED, v1::NOT_CONVERGED, v1::PARTICLE_LOST, v1::OUT_OF_MEMORY,
-                            v1::DISK_FULL, v1::WALL_LIMIT, v1::CHECKPOINT_CORRUPT}) {
+                            v1::WALL_LIMIT, v1::CHECKPOINT_CORRUPT}) {
     EXPECT_EQ(after_attempt(v1::RUNNING, reason, true), v1::FAILED) << reason;
   }
+  EXPECT_EQ(after_attempt(v1::RUNNING, v1::DISK_FULL, true), v1::STATE_SUSPENDED);
 }
 
 TEST(Catalogue, KeepsJobsAndRequestsOverAReopening) {

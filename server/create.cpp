@@ -1,0 +1,159 @@
+// How a job comes into being. What was asked is committed to the catalogue, and with that acknowledged: one write to the disk.
+// Its folder is laid out from there when it is to start; a job that takes up another one's checkpoint has its folder at once,
+// before that checkpoint can be replaced by newer ones.
+#include <google/protobuf/io/coded_stream.h>
+#include <google/protobuf/io/zero_copy_stream_impl_lite.h>
+#include <spdlog/spdlog.h>
+
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "case_file.h"
+#include "jobs.h"
+#include "refusal.h"
+#include "security.h"
+#include "submission.h"
+
+namespace bedflow::server {
+namespace {
+
+namespace fs = std::filesystem;
+
+// The same request gives the same bytes: maps in order.
+std::string content_of(v1::CreateJobRequest request) {
+  request.clear_request_id();
+  std::string bytes;
+  {
+    google::protobuf::io::StringOutputStream stream(&bytes);
+    google::protobuf::io::CodedOutputStream coded(&stream);
+    coded.SetSerializationDeterministic(true);
+    request.SerializeToCodedStream(&coded);
+  }
+  return bytes;
+}
+
+// The folder as it is before the first attempt, durable.
+void write_folder(const JobFolder& folder, const std::string& text, const v1::JobSpec& spec) {
+  write_durably(folder.case_file(), text);
+  write_durably(folder.spec(), spec);
+  write_durably(folder.events(), std::string_view());  // empty: it can be watched from the start
+}
+
+void move_into_place(const JobFolder& draft, const JobFolder& folder) {
+  fs::rename(draft.root(), folder.root());
+  sync_folder(folder.root().parent_path());
+}
+
+}  // namespace
+
+std::optional<v1::CreateJobResponse> Jobs::earlier_answer(const v1::CreateJobRequest& request, const std::string& content) const {
+  if (request.request_id().empty()) return std::nullopt;
+  const auto earlier = catalogue_.find_request(request.request_id());
+  if (!earlier) return std::nullopt;
+  if (earlier->content != content) {
+    throw Refusal(
+        Refused::request_id_reused,
+        "request id " + request.request_id() + " has been used for " + earlier->job + " with another case or specification",
+        "bedflow get " + earlier->job);
+  }
+  v1::CreateJobResponse response;
+  *response.mutable_job() = view(record_of(earlier->job));
+  return response;
+}
+
+void Jobs::start_from(v1::CreateJobRequest& request, JobRecord& record) const {
+  const auto& source = request.start_from();
+  const JobRecord found = record_of(source.job());
+  const auto folder = folder_of(source.job());
+  record.from_step = existing_step(folder, source.job(), source.has_step() ? std::optional(source.step()) : std::nullopt);
+  record.job.set_start_from_job(source.job());
+  record.job.set_start_from_step(*record.from_step);
+  if (!request.has_case_()) *request.mutable_case_() = case_of(found);
+}
+
+v1::Case Jobs::case_of(const JobRecord& record) const {
+  v1::Case value;
+  if (read_message(folder_of(record.job.id()).case_file(), value)) return value;
+  v1::CreateJobRequest asked;
+  if (asked.ParseFromString(catalogue_.content(record)) && asked.has_case_()) return std::move(*asked.mutable_case_());
+  throw Refusal(Refused::backend_error, "the case of " + record.job.id() + " cannot be read");
+}
+
+v1::Case Jobs::read_case(const std::string& id) {
+  const std::lock_guard guard(mutex_);
+  return case_of(record_of(id));
+}
+
+v1::CreateJobResponse Jobs::create(const v1::CreateJobRequest& asked) {
+  const std::string content = content_of(asked);
+  v1::CreateJobRequest request = asked;
+  JobRecord record;
+  if (request.has_request_id() && !is_request_id(request.request_id())) {
+    throw Refusal(Refused::bad_request,
+                  "request_id '" + printable(request.request_id()) + "' is not of the form [A-Za-z0-9-]{8,64}");
+  }
+  {
+    const std::lock_guard guard(mutex_);
+    if (auto earlier = earlier_answer(request, content)) return *earlier;
+    if (request.has_start_from()) start_from(request, record);
+  }
+  if (!request.has_case_())
+    throw Refusal(Refused::bad_request, "the request has neither a case nor start_from", "bedflow init mueller");
+  auto faults = check_case_fields(request.case_());
+  for (auto& fault : check_spec(request.spec(), settings_.slots)) faults.push_back(std::move(fault));
+  if (!faults.empty()) {
+    throw Refusal(Refused::invalid_case,
+                  std::to_string(faults.size()) + (faults.size() == 1 ? " fault" : " faults") + " in the case",
+                  "bedflow validate CASE", std::move(faults));
+  }
+  v1::CreateJobResponse response;
+  *response.mutable_plan() = planner_.plan(case_text(request.case_()), request.spec().ranks());
+  if (request.validate_only()) return response;
+  auto committed = commit(record, request, content);
+  *committed.mutable_plan() = response.plan();
+  return committed;
+}
+
+v1::CreateJobResponse Jobs::commit(JobRecord& record, const v1::CreateJobRequest& request, const std::string& content) {
+  record.job.set_id(new_job_id());
+  record.job.set_state(v1::PENDING);
+  record.job.set_case_name(request.case_().name());
+  *record.job.mutable_spec() = request.spec();
+  record.job.set_created_unix_nanos(now_nanos());
+  record.job.set_changed_unix_nanos(record.job.created_unix_nanos());
+  std::optional<DraftFolder> draft;
+  if (record.from_step) {
+    const JobFolder& folder = draft.emplace(settings_.data / "drafts" / record.job.id()).folder;
+    write_folder(folder, case_text(request.case_()), request.spec());
+    const auto from = folder_of(record.job.start_from_job()).checkpoint(*record.from_step);
+    std::error_code failed;
+    fs::create_hard_link(from, folder.checkpoint(*record.from_step), failed);
+    if (failed) fs::copy_file(from, folder.checkpoint(*record.from_step));
+    sync_folder(folder.checkpoints());
+  }
+  const std::lock_guard guard(mutex_);
+  if (auto earlier = earlier_answer(request, content)) return *earlier;  // a retry has overtaken us
+  if (draft) move_into_place(draft->folder, folder_of(record.job.id()));
+  catalogue_.insert(record, request.request_id(), content);
+  spdlog::info("{} is PENDING: case {}, {} ranks", record.job.id(), printable(record.job.case_name()), request.spec().ranks());
+  notifier_.poke();
+  v1::CreateJobResponse response;
+  *response.mutable_job() = view(record);
+  return response;
+}
+
+void Jobs::lay_out(const JobRecord& record) const {
+  const auto folder = folder_of(record.job.id());
+  if (!fs::exists(folder.case_file())) {
+    const DraftFolder draft(settings_.data / "drafts" / record.job.id());
+    write_folder(draft.folder, case_text(case_of(record)), record.job.spec());
+    move_into_place(draft.folder, folder);
+    return;
+  }
+  v1::JobSpec spec;
+  const bool is_same = read_message(folder.spec(), spec) && spec.SerializeAsString() == record.job.spec().SerializeAsString();
+  if (!is_same) write_durably(folder.spec(), record.job.spec());  // resumed on other ranks
+}
+
+}  // namespace bedflow::server
