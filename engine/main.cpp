@@ -10,6 +10,7 @@
 #include "case/case_scene.h"
 #include "parallel/comm.h"
 #include "plan.h"
+#include "plan_answers.h"
 #include "report/plan_report.h"
 #include "report/snapshot.h"
 #include "run.h"
@@ -64,7 +65,7 @@ int main(int argc, char** argv) {
   app.add_option("--from", arguments.from, "go on from the checkpoint of this step");
   app.add_option("--plan", arguments.plan_case, "print the plan of a case file (PlanReport, text format) and stop")
       ->check(CLI::ExistingFile);
-  app.add_flag("--plans", arguments.plans, "answer questions for plans on the standard input until it ends (plan_report.h)");
+  app.add_flag("--plans", arguments.plans, "answer questions for plans on the standard input until it ends (plan_answers.h)");
   app.add_option("--ranks", arguments.ranks, "ranks that --plan is for")->check(CLI::Range(1, 100000));
   app.add_option("--snapshot", arguments.checkpoint, "print what a picture needs of a checkpoint (Snapshot, binary) and stop")
       ->check(CLI::ExistingFile);

@@ -13,6 +13,7 @@
 #include <system_error>
 
 #include "case/case_scene.h"
+#include "checkpoint/file_names.h"
 #include "plots.h"
 #include "report/job_folder.h"
 #include "simulation.h"
@@ -224,6 +225,7 @@ class Run {
   Agreement agree() {
     Failure mine = simulation_->failure();
     if (!mine) mine = folder_.failure();
+    if (!mine) mine = later_attempt();
     const Command command = folder_.poll();
     std::array<double, 6> flags{};
     flags[0] = static_cast<bool>(mine);
@@ -242,6 +244,17 @@ class Run {
       agreed.failure = {static_cast<Reason>(reason), comm_.broadcast(mine.message, first)};
     }
     return agreed;
+  }
+
+  // Another attempt at the job: from now on nothing is written, the folder is the other's.
+  Failure later_attempt() {
+    if (!comm_.root() || options_.epoch == 0 || wall_seconds() < next_look_) return {};
+    next_look_ = wall_seconds() + 0.1;
+    const std::uint64_t newest = newest_attempt(options_.folder);
+    if (newest <= options_.epoch) return {};
+    folder_.leave();
+    return {Reason::stale_epoch,
+            "attempt " + std::to_string(newest) + " has taken this job over from attempt " + std::to_string(options_.epoch)};
   }
 
   bool checkpoint_due() const {
@@ -380,7 +393,7 @@ class Run {
   RunTotals totals_;
   std::vector<std::string> checkpoint_faults_;
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
-  double last_progress_ = 0, last_checkpoint_time_ = 0, last_checkpoint_wall_ = 0, settling_seconds_ = 0;
+  double next_look_ = 0, last_progress_ = 0, last_checkpoint_time_ = 0, last_checkpoint_wall_ = 0, settling_seconds_ = 0;
   std::uint64_t last_checkpoint_step_ = 0;  // written, or tried
   std::optional<std::uint64_t> good_checkpoint_step_;
   std::int64_t next_plot_ = 0;

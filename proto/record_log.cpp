@@ -164,14 +164,16 @@ bool LogReader::read_up_to(std::size_t most, const std::function<void(const LogR
     fail(errno, "opening", path_);
   }
   std::size_t taken = 0;
+  LogRecord record;  // its memory serves all
   for (std::size_t chunk = chunk_bytes;;) {
     const std::string bytes = bytes_at(file.get(), offset_, chunk, path_);
     std::string_view rest = bytes;
     while (is_sound(rest) && number_at<std::uint64_t>(rest, 8) == next_sequence_) {
       if (taken++ == most) return true;
       const std::size_t size = *record_bytes(rest);
-      LogRecord record{number_at<std::uint32_t>(rest, 4), next_sequence_,
-                       std::string(rest.substr(header_bytes, size - header_bytes))};
+      record.type = number_at<std::uint32_t>(rest, 4);
+      record.sequence = next_sequence_;
+      record.payload.assign(rest, header_bytes, size - header_bytes);
       offset_ += size;
       ++next_sequence_;
       rest.remove_prefix(size);

@@ -169,6 +169,8 @@ Catalogue::Catalogue(const std::filesystem::path& file) {
     if (found == 1) run(database, from_version_1);
     transaction.commit();
   }
+  int keep = 1;  // the log stays as long as it is when the server ends
+  sqlite3_file_control(database, nullptr, SQLITE_FCNTL_PERSIST_WAL, &keep);
   std::error_code none;
   const auto log_bytes = std::filesystem::file_size(file.string() + "-wal", none);
   if ((none || log_bytes < 4'000'000) && sqlite3_exec(database, make_room, nullptr, nullptr, nullptr) != SQLITE_OK) {

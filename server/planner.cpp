@@ -29,11 +29,7 @@ using Clock = std::chrono::steady_clock;
 constexpr auto longest_answer = 30s;
 constexpr std::size_t most_answer_bytes = 16 << 20;
 constexpr std::size_t most_idle = 2;
-
-struct PlanAnswer {
-  int code = -1;
-  std::string text;
-};
+constexpr auto patience = 100ms;  // for an engine that is busy with another caller's plan, before one more is started
 
 // Which file a program is: another one after an upgrade.
 std::pair<std::uint64_t, std::int64_t> identity(const std::filesystem::path& program) {
@@ -85,7 +81,7 @@ class Planner::Engine {
   bool is_of(const std::filesystem::path& program) const { return program_ == identity(program); }
 
   // Nothing when the engine ends, says what is no answer, or takes too long; it is of no use then.
-  std::optional<PlanAnswer> ask(const std::string& case_text, std::uint32_t ranks) {
+  std::optional<Answer> ask(const std::string& case_text, std::uint32_t ranks) {
     const auto deadline = Clock::now() + longest_answer;
     if (!send(std::to_string(ranks) + " " + std::to_string(case_text.size()) + "\n" + case_text, deadline)) return std::nullopt;
     std::string got;
@@ -93,7 +89,7 @@ class Planner::Engine {
       if (got.size() > 64 || !receive(got, deadline)) return std::nullopt;
     }
     const auto head_end = got.find('\n');
-    PlanAnswer answer;
+    Answer answer;
     std::size_t bytes = 0;
     std::istringstream head(got.substr(0, head_end));
     if (!(head >> answer.code >> bytes) || bytes > most_answer_bytes) return std::nullopt;
@@ -136,7 +132,9 @@ Planner::Planner(std::filesystem::path engine) : program_(std::move(engine)) {}
 Planner::~Planner() = default;
 
 std::unique_ptr<Planner::Engine> Planner::take() {
-  const std::lock_guard guard(mutex_);
+  std::unique_lock guard(mutex_);
+  if (busy_ >= most_idle) given_back_.wait_for(guard, patience, [this] { return !idle_.empty() || busy_ < most_idle; });
+  ++busy_;
   while (!idle_.empty()) {
     auto engine = std::move(idle_.back());
     idle_.pop_back();
@@ -147,21 +145,32 @@ std::unique_ptr<Planner::Engine> Planner::take() {
 
 void Planner::give_back(std::unique_ptr<Engine> engine) {
   const std::lock_guard guard(mutex_);
-  if (idle_.size() < most_idle) idle_.push_back(std::move(engine));
+  --busy_;
+  if (engine && idle_.size() < most_idle) idle_.push_back(std::move(engine));
+  given_back_.notify_one();
+}
+
+// Nothing when even a new engine has no answer.
+std::optional<Planner::Answer> Planner::ask(const std::string& case_text, std::uint32_t ranks) {
+  auto engine = take();
+  std::optional<Answer> answer;
+  try {
+    if (engine) answer = engine->ask(case_text, ranks);
+    if (!answer) {  // there was none, or it has been killed meanwhile
+      engine = std::make_unique<Engine>(program_);
+      answer = engine->ask(case_text, ranks);
+    }
+  } catch (...) {
+    give_back(nullptr);
+    throw;
+  }
+  give_back(answer ? std::move(engine) : nullptr);
+  return answer;
 }
 
 v1::PlanReport Planner::plan(const std::string& case_text, std::uint32_t ranks) {
-  std::optional<PlanAnswer> answer;
-  if (auto used = take()) {
-    answer = used->ask(case_text, ranks);  // one that has been killed meanwhile gives none: a new one is asked
-    if (answer) give_back(std::move(used));
-  }
-  if (!answer) {
-    auto fresh = std::make_unique<Engine>(program_);
-    answer = fresh->ask(case_text, ranks);
-    if (!answer) throw Refusal(Refused::backend_error, "the engine died over the plan of this case, or gave none within 30 s");
-    give_back(std::move(fresh));
-  }
+  const auto answer = ask(case_text, ranks);
+  if (!answer) throw Refusal(Refused::backend_error, "the engine died over the plan of this case, or gave none within 30 s");
   if (answer->code == v1::INVALID_CASE) {
     std::vector<v1::Fault> faults;
     std::istringstream lines(answer->text);

@@ -2,12 +2,12 @@
 // new process for each submission would cost more than all the rest of it.
 #pragma once
 
-#include <sys/types.h>
-
+#include <condition_variable>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,18 +20,25 @@ class Planner {
   explicit Planner(std::filesystem::path engine);
   ~Planner();
 
-  // From any thread; as many engines as callers at once, of which a few stay. Throws Refusal: invalid_case with the engine's
-  // faults, backend_error when it cannot be asked.
+  // From any thread. A few engines stay; more are started only when these are busy for long. Throws Refusal: invalid_case with
+  // the engine's faults, backend_error when it cannot be asked.
   v1::PlanReport plan(const std::string& case_text, std::uint32_t ranks);
 
  private:
   class Engine;
-  std::unique_ptr<Engine> take();
-  void give_back(std::unique_ptr<Engine> engine);
+  struct Answer {
+    int code = -1;
+    std::string text;
+  };
+  std::unique_ptr<Engine> take();                  // an idle one, if there is one
+  void give_back(std::unique_ptr<Engine> engine);  // none: it was of no use any more
+  std::optional<Answer> ask(const std::string& case_text, std::uint32_t ranks);
 
   const std::filesystem::path program_;
   std::mutex mutex_;
+  std::condition_variable given_back_;
   std::vector<std::unique_ptr<Engine>> idle_;
+  std::size_t busy_ = 0;  // callers that have one
 };
 
 }  // namespace bedflow::server

@@ -17,7 +17,6 @@
 
 #include "bedflow/v1/job.pb.h"
 #include "bedflow/v1/results.pb.h"
-#include "checkpoint/file_names.h"
 #include "record_log.h"
 
 namespace bedflow {
@@ -277,20 +276,10 @@ void JobFolder::sync() {
   }
 }
 
-void JobFolder::look_for_later_attempt() {
-  const std::uint64_t newest = epoch_ == 0 ? 0 : newest_attempt(path_);
-  if (newest <= epoch_) return;
-  failure_ = {Reason::stale_epoch,
-              "attempt " + std::to_string(newest) + " has taken this job over from attempt " + std::to_string(epoch_)};
-  leave();
-}
-
 Command JobFolder::poll() {
   const auto now = std::chrono::steady_clock::now();
   if (!logs_ || now - last_poll_ < std::chrono::milliseconds(100)) return Command::none;
   last_poll_ = now;
-  look_for_later_attempt();
-  if (!logs_) return Command::none;
   const int heartbeat = open((path_ / "heartbeat").c_str(), O_WRONLY | O_CREAT, 0644);
   if (heartbeat >= 0) {
     futimens(heartbeat, nullptr);

@@ -51,8 +51,7 @@ struct MonitorReport {
   int averaging_bins = 0;
 };
 
-// Rank 0 writes; on the other ranks every call does nothing. A file that cannot be written is kept as failure(), to be voted on,
-// and so is a later attempt at the job: from then on nothing is written, the folder is the other's.
+// Rank 0 writes; on the other ranks every call does nothing. A file that cannot be written is kept as failure(), to be voted on.
 class JobFolder {
  public:
   // go_on_when_full: what does not fit on the disk waits in memory, up to a bound, and is written when there is room.
@@ -89,7 +88,6 @@ class JobFolder {
   void append(const Record& record);
   void append_event(v1::Event event);
   void note(const std::system_error& error);
-  void look_for_later_attempt();
   void log_line(int severity, const std::string& text);
 
   std::filesystem::path path_;

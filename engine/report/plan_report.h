@@ -1,7 +1,6 @@
 // The plan as the service's message.
 #pragma once
 
-#include <iosfwd>
 #include <string>
 
 #include "plan.h"
@@ -10,10 +9,5 @@ namespace bedflow {
 
 // PlanReport in protobuf text format.
 std::string plan_report(const Plan& plan);
-
-// Plans for whoever asks again and again and cannot wait for a program to start: the server. A question is a line "RANKS BYTES"
-// and so many bytes of a case, its answer a line "CODE BYTES" and so many bytes: a PlanReport in text format with code 0, else
-// the faults, a line each, with the exit code that --plan has for them. Until the input ends; false when a question is none.
-bool answer_plans(std::istream& questions, std::ostream& answers);
 
 }  // namespace bedflow

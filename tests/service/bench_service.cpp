@@ -1,0 +1,212 @@
+// The service's figures, a line each: name, value, unit, notes (tests/performance/figures.py reads them). Real server, real
+// engine, real disk.
+//
+// usage: bench_service [submit|queue|statistics]...
+#include <grpcpp/grpcpp.h>
+#include <signal.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstdio>
+#include <fstream>
+#include <functional>
+#include <map>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "bedflow/v1/results.pb.h"
+#include "case_file.h"
+#include "folder.h"
+#include "process.h"
+#include "record_log.h"
+#include "support/server_process.h"
+
+namespace bedflow::test {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using namespace std::chrono_literals;
+
+double milliseconds(Clock::duration time) {
+  return std::chrono::duration<double, std::milli>(time).count();
+}
+
+double quantile(std::vector<double> values, double part) {
+  std::sort(values.begin(), values.end());
+  return values.at(static_cast<std::size_t>(part * static_cast<double>(values.size() - 1)));
+}
+
+void report(const std::string& name, double value, const std::string& unit, const std::string& notes) {
+  std::printf("%s, %.6g, %s, %s\n", name.c_str(), value, unit.c_str(), notes.c_str());
+  std::fflush(stdout);
+}
+
+std::string text_of(const char* format, double a, double b = 0) {
+  std::array<char, 200> text{};
+  std::snprintf(text.data(), text.size(), format, a, b);
+  return text.data();
+}
+
+void must(const grpc::Status& status) {
+  if (!status.ok()) throw std::runtime_error(status.error_message() + " " + detail_of(status).ShortDebugString());
+}
+
+v1::CreateJobRequest ready_case(const std::string& name) {
+  const auto answer = server::ask({BEDFLOW_BIN_DIR "/bedflow", "init", name}, 10s, 1 << 20);
+  v1::CreateJobRequest request;
+  *request.mutable_case_() = read_case(answer.output).value;
+  return request;
+}
+
+// A server of one slot, which an engine that has been stopped (SIGSTOP) takes up: what comes next waits.
+class Bench {
+ public:
+  Bench() {
+    const auto first = submit(server_.stub(), "bench-first");
+    if (wait_for_state(server_.stub(), first, v1::RUNNING, 120s).state() != v1::RUNNING)
+      throw std::runtime_error("no engine runs");
+    for (const pid_t engine : server_.engines(first)) ::kill(engine, SIGSTOP);
+  }
+  ServerProcess& server() { return server_; }
+  std::string submit(v1::JobService::Stub& stub, const std::string& request_id) const {
+    auto request = request_;
+    request.set_request_id(request_id);
+    grpc::ClientContext context;
+    v1::CreateJobResponse response;
+    must(stub.CreateJob(&context, request, &response));
+    return response.job().id();
+  }
+
+ private:
+  v1::CreateJobRequest request_ = ready_case("mueller");
+  TemporaryFolder folder_;
+  ServerProcess server_{BEDFLOW_BIN_DIR "/bedflowd",
+                        folder_.path() / "data",
+                        BEDFLOW_BIN_DIR "/bedflow-engine",
+                        {"--slots", "1", "--heartbeat-seconds", "3600"}};
+};
+
+void submit() {
+  Bench bench;
+  std::vector<double> times;
+  for (int i = 0; i < 500; ++i) {
+    const auto start = Clock::now();
+    bench.submit(bench.server().stub(), "bench-one-" + std::to_string(i));
+    times.push_back(milliseconds(Clock::now() - start));
+  }
+  report("service/submit/median", quantile(times, 0.5), "ms",
+         text_of("90 %% within %.3g ms, 99 %% within %.3g ms", quantile(times, 0.9), quantile(times, 0.99)));
+}
+
+// 10 000 jobs by 16 clients; then their list, and a new server on them.
+void queue() {
+  constexpr int clients = 16, jobs = 10'000;
+  Bench bench;
+  const auto begin = Clock::now();
+  std::vector<std::thread> threads;
+  std::vector<double> times(jobs);
+  for (int client = 0; client < clients; ++client) {
+    threads.emplace_back([&, client] {
+      const auto stub = v1::JobService::NewStub(bench.server().channel());
+      for (int i = client; i < jobs; i += clients) {
+        const auto start = Clock::now();
+        bench.submit(*stub, "bench-many-" + std::to_string(i));
+        times[static_cast<std::size_t>(i)] = milliseconds(Clock::now() - start);
+      }
+    });
+  }
+  for (auto& thread : threads) thread.join();
+  const double seconds = milliseconds(Clock::now() - begin) / 1000;
+  report("service/submit/sixteen_clients", jobs / seconds, "jobs/s",
+         text_of("median %.3g ms, 99 %% within %.3g ms", quantile(times, 0.5), quantile(times, 0.99)));
+
+  const auto first_page = [&](std::uint32_t size) {
+    std::vector<double> pages;
+    for (int i = 0; i < 20; ++i) {
+      grpc::ClientContext context;
+      v1::ListJobsRequest request;
+      request.set_page_size(size);
+      v1::ListJobsResponse response;
+      const auto start = Clock::now();
+      must(bench.server().stub().ListJobs(&context, request, &response));
+      pages.push_back(milliseconds(Clock::now() - start));
+    }
+    return quantile(pages, 0.5);
+  };
+  report("service/list/first_page", first_page(50), "ms",
+         text_of("50 of 10 000 jobs; 1000 of them in %.3g ms", first_page(1000)));
+
+  std::vector<double> restarts;
+  for (int i = 0; i < 5; ++i) {
+    bench.server().kill();
+    const auto start = Clock::now();
+    bench.server().start();
+    grpc::ClientContext context;
+    v1::ServerInfo info;
+    must(bench.server().stub().GetServerInfo(&context, {}, &info));
+    restarts.push_back(milliseconds(Clock::now() - start) / 1000);
+    if (info.jobs_pending() != jobs)
+      throw std::runtime_error("the new server has " + std::to_string(info.jobs_pending()) + " jobs");
+  }
+  report("service/restart", quantile(restarts, 0.5), "s", "10 000 jobs, after a kill, until the first call is answered");
+}
+
+void statistics() {
+  constexpr int samples = 1'000'000;
+  Bench bench;
+  const auto id = bench.submit(bench.server().stub(), "bench-statistics");
+  const server::JobFolder folder(bench.server().folder(id));
+  std::filesystem::create_directories(folder.root());
+  {
+    LogWriter log(folder.statistics());
+    v1::StatisticsRecord record;
+    auto& monitor = *record.mutable_schema()->add_monitors();
+    monitor.set_name("height");
+    monitor.set_unit("m");
+    log.append(1, record.SerializeAsString());
+    for (int i = 1; i <= samples; ++i) {
+      auto& sample = *record.mutable_sample();
+      sample.set_monitor(0);
+      sample.set_step(static_cast<std::uint64_t>(i));
+      sample.set_time(1e-4 * i);
+      sample.set_value(0.1 + 1e-3 * (i % 977));
+      log.append(1, record.SerializeAsString());
+    }
+  }
+  const auto ask = [&] {
+    grpc::ClientContext context;
+    v1::QueryStatisticsRequest request;
+    request.set_id(id);
+    request.set_most(2000);
+    v1::Statistics answer;
+    const auto start = Clock::now();
+    must(bench.server().stub().QueryStatistics(&context, request, &answer));
+    const double time = milliseconds(Clock::now() - start);
+    if (answer.series_size() != 1 || answer.series(0).value_size() < 1000) throw std::runtime_error("no series of samples");
+    return time;
+  };
+  const double first = ask();
+  std::vector<double> times;
+  for (int i = 0; i < 9; ++i) times.push_back(ask());
+  report("service/statistics/million", quantile(times, 0.5), "ms", text_of("thinned to 2000; the first time %.3g ms", first));
+}
+
+}  // namespace
+}  // namespace bedflow::test
+
+int main(int argc, char** argv) {
+  const std::map<std::string, std::function<void()>> parts = {
+      {"submit", bedflow::test::submit}, {"queue", bedflow::test::queue}, {"statistics", bedflow::test::statistics}};
+  std::vector<std::string> wanted(argv + 1, argv + argc);
+  if (wanted.empty()) wanted = {"submit", "queue", "statistics"};
+  try {
+    for (const auto& part : wanted) parts.at(part)();
+  } catch (const std::exception& failure) {
+    std::fprintf(stderr, "bench_service: %s\n", failure.what());
+    return 1;
+  }
+  return 0;
+}
