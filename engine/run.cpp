@@ -6,7 +6,6 @@
 #include <chrono>
 #include <csignal>
 #include <cstdio>
-#include <cstring>
 #include <fstream>
 #include <new>
 #include <sstream>
@@ -18,6 +17,7 @@
 #include "report/job_folder.h"
 #include "simulation.h"
 #include "statistics/monitors.h"
+#include "statistics_state.h"
 #include "summary.h"
 
 namespace bedflow {
@@ -110,35 +110,15 @@ class Run {
     }
     const CheckpointReader reader(comm_, found->path);
     simulation_->restore(reader);
-    restore_statistics(reader);
+    if (!restore_statistics(reader, *monitors_)) {
+      folder_.info("the monitors are not those of the checkpoint: statistics begin here");
+    }
     last_checkpoint_time_ = simulation_->time();
     last_checkpoint_step_ = simulation_->steps();
     good_checkpoint_step_ = found->step;
     next_plot_ =
         plan_.scene.plot_interval ? static_cast<std::int64_t>(simulation_->time() / *plan_.scene.plot_interval + 1e-9) + 1 : 0;
     return found->path.filename().string();
-  }
-
-  // Statistics go on where the checkpoint left them, unless the case asks for others than it did.
-  void restore_statistics(const CheckpointReader& reader) {
-    if (reader.text("statistics/monitors") != monitors_signature()) {
-      folder_.info("the monitors are not those of the checkpoint: statistics begin here");
-      return;
-    }
-    const std::string state = reader.text("statistics/state");
-    std::vector<double> values(state.size() / sizeof(double));
-    std::memcpy(values.data(), state.data(), values.size() * sizeof(double));
-    monitors_->restore(values);
-  }
-  std::string monitors_signature() const {
-    std::ostringstream text;
-    text.precision(17);
-    for (std::size_t m = 0; m < monitors_->size(); ++m) {
-      const MonitorSetup& setup = monitors_->setup(m);
-      text << setup.name << ' ' << monitors_->meaning(m) << ' ' << monitors_->places(m).size() << ' ' << setup.interval << ' '
-           << setup.averaging_start << ' ' << setup.averaging_bin << ' ' << setup.averaging_bins << '\n';
-    }
-    return std::move(text).str();
   }
 
   void settle() {
@@ -309,15 +289,7 @@ class Run {
     const PhaseTimer::Scope scope(timer_, Phase::checkpoint);
     const double before = wall_seconds();
     CheckpointContent content = simulation_->checkpoint();
-    const std::vector<double> state = monitors_->state();
-    const auto bytes = std::as_bytes(std::span(state));
-    content.arrays.push_back({"statistics/state",
-                              "",
-                              "sums of the monitors, in the order of the case",
-                              std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()),
-                              {},
-                              1});
-    content.arrays.push_back({"statistics/monitors", "", "what the sums belong to", monitors_signature(), {}, 1});
+    add_statistics(*monitors_, content);
     content.arrays.push_back({"case", "", "the effective case, protobuf text format", case_text(), {}, 1});
     last_checkpoint_step_ = simulation_->steps();
     last_checkpoint_time_ = simulation_->time();
