@@ -100,6 +100,10 @@ void Simulation::put_particles(CheckpointContent& content) const {
   const Amount there = present();
   content.numbers["particles/diameter"] = plan_.scene.particles->largest();
   content.numbers["particles/types"] = static_cast<double>(setup.types.size());
+  for (std::size_t t = 0; t < setup.types.size(); ++t) {
+    content.numbers["particles/type_" + std::to_string(t) + "_density"] = setup.types[t].density;
+    content.numbers["particles/type_" + std::to_string(t) + "_diameter"] = 2 * setup.types[t].radius;
+  }
   content.numbers["particles/count"] = static_cast<double>(there.count);
   content.numbers["particles/total_mass"] = there.mass;
   if (plan_.tuned_skin) {

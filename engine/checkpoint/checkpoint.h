@@ -32,6 +32,17 @@ struct CheckpointArray {
   std::variant<std::vector<double>, std::vector<std::int64_t>, std::string> values;
   std::optional<GridPart> part;  // grid array
   int columns = 1;               // row array
+  // Of a row array that one rank writes as it was written by many (CheckpointContent::ranks): their first rows, and the end.
+  std::vector<std::int64_t> rank_offsets = {};
+};
+
+// An array as it lies in a file. Grid arrays have the shape (z, y, x), row arrays (rows, columns) or (rows), text arrays (bytes). A
+// row array is followed by "rank_offsets/<name>": the first row of each rank, and the number of all rows.
+struct Dataset {
+  enum class Type { real, integer, byte };
+  std::string name, unit, meaning;
+  Type type = Type::real;
+  std::vector<std::uint64_t> shape;
 };
 
 struct CheckpointContent {
@@ -39,6 +50,7 @@ struct CheckpointContent {
   double time = 0;                        // s
   std::map<std::string, double> numbers;  // attributes of the root: totals, time-step controller …
   std::vector<CheckpointArray> arrays;
+  int ranks = 0;  // that it is of; 0: those that write it
 };
 
 struct CheckpointInfo {
@@ -66,11 +78,14 @@ std::vector<CheckpointInfo> list_checkpoints(const std::filesystem::path& folder
 std::optional<CheckpointInfo> newest_good_checkpoint(const Comm& comm, const std::filesystem::path& folder,
                                                      std::vector<std::string>& faults);
 
+// Of a file's blocks: all before anything is read, or those of an array when it is read.
+enum class Verified { whole, as_read };
+
 // A verified file, open for reading by all ranks.
 class CheckpointReader {
  public:
-  // Throws Stop(checkpoint_corrupt) naming dataset and block, on every rank alike.
-  CheckpointReader(const Comm& comm, const std::filesystem::path& path);
+  // Throws Stop(checkpoint_corrupt) naming dataset and block, on every rank alike; with as_read, reading does too.
+  CheckpointReader(const Comm& comm, const std::filesystem::path& path, Verified verified = Verified::whole);
   ~CheckpointReader();
 
   std::uint64_t step() const;
@@ -78,6 +93,10 @@ class CheckpointReader {
   int ranks() const;  // that wrote it
   bool has_number(const std::string& name) const;
   double number(const std::string& name) const;
+  std::map<std::string, double> numbers() const;
+  // What lies there, each as the manifest has it; in the manifest's order. Throws Stop(checkpoint_corrupt) for a dataset that is
+  // not plain numbers side by side where and as long as the manifest says.
+  std::vector<Dataset> datasets() const;
   bool has(const std::string& array) const;
   std::string text(const std::string& array) const;
   // The three below are collective. Part of the grid as asked for, x fastest; global must be the stored shape.

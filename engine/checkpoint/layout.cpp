@@ -61,7 +61,8 @@ std::vector<Run> grid_runs(const GridPart& part, std::span<const std::byte> byte
 
 }  // namespace
 
-Layout::Layout(const Comm& comm, const CheckpointContent& content) : content_(content), ranks_(comm.size()), root_(comm.root()) {
+Layout::Layout(const Comm& comm, const CheckpointContent& content)
+    : content_(content), ranks_(content.ranks > 0 ? content.ranks : comm.size()), root_(comm.root()) {
   do_alike(comm, [&] {
     for (const CheckpointArray& array : content.arrays) check_fits(array);
   });
@@ -86,11 +87,13 @@ void Layout::add(const Comm& comm, const CheckpointArray& array) {
   offsets.insert(offsets.begin(), 0);
   std::partial_sum(offsets.begin(), offsets.end(), offsets.begin());
   const auto rows = static_cast<std::uint64_t>(offsets.back());
+  const auto first_row = static_cast<std::uint64_t>(offsets[comm.rank()]);
+  if (!array.rank_offsets.empty()) offsets = array.rank_offsets;
   if (text) dataset.type = Dataset::Type::byte;
   dataset.shape = {rows};
   if (columns > 1) dataset.shape.push_back(columns);
   datasets_.push_back(dataset);
-  sources_.push_back({&array, static_cast<std::uint64_t>(offsets[comm.rank()])});
+  sources_.push_back({&array, first_row});
   if (text) return;
   datasets_.push_back({"rank_offsets/" + array.name,
                        "1",

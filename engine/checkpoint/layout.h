@@ -13,15 +13,6 @@
 
 namespace bedflow {
 
-// One dataset of the file, as every rank knows it. Grid arrays have the shape (z, y, x), row arrays (rows, columns) or (rows),
-// text arrays (bytes). A row array is followed by "rank_offsets/<name>": the first row of each rank, and the number of all rows.
-struct Dataset {
-  enum class Type { real, integer, byte };
-  std::string name, unit, meaning;
-  Type type = Type::real;
-  std::vector<std::uint64_t> shape;
-};
-
 // Bytes of this rank that lie side by side in a dataset, and where.
 struct Run {
   std::span<const std::byte> bytes;
