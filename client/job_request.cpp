@@ -9,16 +9,33 @@
 
 namespace bedflow::client {
 
-namespace {
-
-std::string random_id() {
+std::string new_request_id() {
   std::random_device device;
   std::string id;
   for (int i = 0; i < 32; ++i) id += "0123456789abcdef"[device() % 16];
   return id;
 }
 
-}  // namespace
+void set_labels(v1::JobSpec& spec, const std::vector<std::string>& labels) {
+  for (const auto& label : labels) {
+    const auto equals = label.find('=');
+    if (equals == label.npos || equals == 0) throw Failure(Exit::usage, "--label " + label + ": not of the form NAME=VALUE");
+    (*spec.mutable_labels())[label.substr(0, equals)] = label.substr(equals + 1);
+  }
+}
+
+v1::CheckpointName checkpoint_name(const std::string& text) {
+  v1::CheckpointName name;
+  const auto at = text.find('@');
+  name.set_job(text.substr(0, at));
+  if (at == text.npos) return name;
+  const auto step = text.substr(at + 1);
+  if (step.empty() || step.size() > 18 || step.find_first_not_of("0123456789") != step.npos) {
+    throw Failure(Exit::usage, text + ": the step after @ is not a number", "bedflow checkpoint list " + name.job());
+  }
+  name.set_step(std::stoull(step));
+  return name;
+}
 
 void add_job_options(CLI::App* verb, JobOptions& options) {
   verb->add_option("--set", options.set, "change a parameter, as in time.end=2")->type_name("PATH=VALUE");
@@ -33,7 +50,7 @@ void add_job_options(CLI::App* verb, JobOptions& options) {
 
 v1::CreateJobRequest create_request(const JobOptions& options) {
   v1::CreateJobRequest request;
-  request.set_request_id(random_id());
+  request.set_request_id(new_request_id());
   if (!options.where.empty()) {
     auto set = options.set;
     if (options.end) set.push_back("time.end=" + CLI::detail::to_string(*options.end));
@@ -44,11 +61,7 @@ v1::CreateJobRequest create_request(const JobOptions& options) {
   if (options.checkpoint_every) spec.mutable_checkpoints()->set_every_simulated_seconds(*options.checkpoint_every);
   if (options.checkpoint_steps) spec.mutable_checkpoints()->set_every_steps(*options.checkpoint_steps);
   if (options.wall_limit) spec.set_wall_limit_seconds(*options.wall_limit);
-  for (const auto& label : options.labels) {
-    const auto equals = label.find('=');
-    if (equals == label.npos || equals == 0) throw Failure(Exit::usage, "--label " + label + ": not of the form NAME=VALUE");
-    (*spec.mutable_labels())[label.substr(0, equals)] = label.substr(equals + 1);
-  }
+  set_labels(spec, options.labels);
   return request;
 }
 

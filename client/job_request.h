@@ -27,6 +27,14 @@ void add_job_options(CLI::App* verb, JobOptions& options);
 // With a random request id, so that the call may be repeated. Throws Failure when the case has faults.
 v1::CreateJobRequest create_request(const JobOptions& options);
 
+std::string new_request_id();
+
+// NAME=VALUE each. Throws Failure.
+void set_labels(v1::JobSpec& spec, const std::vector<std::string>& labels);
+
+// JOB or JOB@STEP. Throws Failure.
+v1::CheckpointName checkpoint_name(const std::string& text);
+
 // Repeats a call whose answer was lost: the request id makes that harmless.
 v1::CreateJobResponse create_job(const Connection& connection, const v1::CreateJobRequest& request);
 

@@ -57,6 +57,7 @@ Table table_of(const v1::Job& job) {
   table.add({"last event", std::to_string(job.last_sequence())});
   if (job.has_start_from_job())
     table.add({"started from", job.start_from_job() + ", step " + std::to_string(job.start_from_step())});
+  for (const auto& one : job.overrides()) table.add({"changed " + one.path(), one.from() + " -> " + one.to()});
   for (const auto& [name, value] : job.spec().labels()) table.add({"label " + name, value});
   if (!job.folder().empty()) table.add({"folder", job.folder()});
   return table;

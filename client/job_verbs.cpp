@@ -1,4 +1,9 @@
-// submit, list, get, cancel, suspend, resume: jobs on a server.
+// submit, list, get, cancel, suspend, resume, delete: jobs on a server.
+#include <unistd.h>
+
+#include <iostream>
+
+#include "case_source.h"
 #include "job_request.h"
 #include "job_table.h"
 #include "live_view.h"
@@ -15,19 +20,14 @@ struct SubmitOptions : JobOptions {
   Format format = Format::table;
 };
 
-// JOB or JOB@STEP.
-v1::CheckpointName checkpoint_name(const std::string& text) {
-  v1::CheckpointName name;
-  const auto at = text.find('@');
-  name.set_job(text.substr(0, at));
-  if (at == text.npos) return name;
-  const auto step = text.substr(at + 1);
-  if (step.empty() || step.size() > 18 || step.find_first_not_of("0123456789") != step.npos) {
-    throw Failure(Exit::usage, "--start-from " + text + ": the step after @ is not a number",
-                  "bedflow checkpoint list " + name.job());
-  }
-  name.set_step(std::stoull(step));
-  return name;
+// The case of the job that is started from, with the changes of the command line.
+v1::Case changed_case(const Connection& connection, const SubmitOptions& options) {
+  auto value = connection.get_job(checkpoint_name(options.start_from).job(), true).case_();
+  for (const auto& assignment : options.set) set_value(value, assignment);
+  if (options.end) value.mutable_time()->set_end(*options.end);
+  auto faults = check_case(value);
+  if (!faults.empty()) throw Failure(Exit::usage, "the changed case has faults", "bedflow reference", std::move(faults));
+  return value;
 }
 
 Exit submit(const Program& program, const SubmitOptions& options) {
@@ -35,15 +35,13 @@ Exit submit(const Program& program, const SubmitOptions& options) {
   if (options.where.empty() && options.start_from.empty()) {
     throw Failure(Exit::usage, "a case is missing", "bedflow submit CASE, or bedflow submit --start-from JOB");
   }
-  if (options.where.empty() && (!options.set.empty() || options.end)) {
-    throw Failure(Exit::usage, "--set and --end change a case that is given; with --start-from alone it is the checkpoint's own",
-                  "bedflow get " + options.start_from + " --case > case.txtpb, then submit that with --start-from");
-  }
   auto request = create_request(options);
   if (!options.request_id.empty()) request.set_request_id(options.request_id);
   if (options.validate_only) request.set_validate_only(true);
   if (!options.start_from.empty()) *request.mutable_start_from() = checkpoint_name(options.start_from);
   const Connection connection(program.server);
+  if (options.where.empty() && (!options.set.empty() || options.end))
+    *request.mutable_case_() = changed_case(connection, options);
   const auto response = create_job(connection, request);
   if (options.validate_only) {
     Table table({"part", "on", "why"});
@@ -106,6 +104,38 @@ Exit list(const Program& program, const ListOptions& options) {
   return Exit::ok;
 }
 
+struct DeleteOptions {
+  std::vector<std::string> jobs;
+  bool yes = false;
+};
+
+Exit delete_jobs(const Program& program, const DeleteOptions& options) {
+  const Connection connection(program.server);
+  if (!options.yes) {
+    if (isatty(STDIN_FILENO) != 1)
+      throw Failure(Exit::usage, "deleting asks, and there is no terminal to ask on",
+                    "bedflow delete --yes " + options.jobs.front());
+    for (const auto& id : options.jobs) {
+      const auto job = connection.get_job(id);
+      say(id + "  " + job.case_name() + "  " + state_name(job.state()));
+    }
+    std::fputs("delete with all results and checkpoints? [y/N] ", stderr);
+    std::string answer;
+    std::getline(std::cin, answer);
+    if (answer != "y" && answer != "Y" && answer != "yes") {
+      say("nothing was deleted");
+      return Exit::cancelled;
+    }
+  }
+  for (const auto& id : options.jobs) {
+    v1::DeleteJobRequest request;
+    request.set_id(id);
+    const auto response = connection.call(&Stub::DeleteJob, request, 120);
+    say(id + " is deleted; " + bytes_text(static_cast<double>(response.freed_bytes())) + " are free again");
+  }
+  return Exit::ok;
+}
+
 struct OneJobOptions {
   std::string job;
   bool with_case = false, skip_checkpoint = false;
@@ -158,7 +188,8 @@ void add_job_verbs(CLI::App& app, Program& program) {
   auto* verb = app.add_subcommand("submit", "hand a case to the server; prints the id of the job");
   verb->add_option("case", submit_options->where, "file, - for stdin, or a ready case");
   add_job_options(verb, *submit_options);
-  verb->add_option("--start-from,--from", submit_options->start_from, "start from a checkpoint of a job")
+  verb->add_option("--start-from,--from", submit_options->start_from,
+                   "start from a checkpoint of a job; without a case its own, which --set changes")
       ->type_name("JOB[@STEP]");
   verb->add_option("--request-id", submit_options->request_id, "8 to 64 letters, digits and -; the same id gives the same job");
   verb->add_flag("--validate-only", submit_options->validate_only, "every check, the plan and the estimate; no job");
@@ -173,6 +204,12 @@ void add_job_verbs(CLI::App& app, Program& program) {
   verb->add_option("--most", list_options->most, "at most so many")->check(CLI::PositiveNumber)->capture_default_str();
   add_format(verb, list_options->format);
   on_call(verb, program, list_options, list);
+
+  const auto delete_options = std::make_shared<DeleteOptions>();
+  verb = app.add_subcommand("delete", "delete jobs that have ended, with all that they left");
+  verb->add_option("job", delete_options->jobs, "ids of the jobs")->required();
+  verb->add_flag("--yes", delete_options->yes, "do not ask");
+  on_call(verb, program, delete_options, delete_jobs);
 
   const auto one_job = [&](const char* name, const char* meaning, Exit (*function)(const Program&, const OneJobOptions&)) {
     auto options = std::make_shared<OneJobOptions>();

@@ -42,6 +42,8 @@ int run(int argc, char** argv) {
   add_job_verbs(app, program);
   add_watch_verbs(app, program);
   add_result_verbs(app, program);
+  add_field_verbs(app, program);
+  add_checkpoint_verbs(app, program);
   add_server_verbs(app, program);
   try {
     app.parse(argc, argv);

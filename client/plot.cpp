@@ -126,11 +126,16 @@ void draw_references(Panel& panel, const std::vector<const v1::Reference*>& refe
 }
 
 std::string series_panel(const v1::Series& series, const std::optional<v1::Case>& value, int index) {
-  const auto y = scale_of(series.unit(), largest(series.value()));
+  const auto y =
+      scale_of(series.unit(), std::max({largest(series.value()), largest(series.minimum()), largest(series.maximum())}));
   Panel panel("series" + std::to_string(index), spaced(series.name()));
   panel.axes(label("time", "s"), label(spaced(series.name()), y.unit));
   std::string rows;
-  for (int i = 0; i < series.value_size(); ++i) rows += row({series.time(i), series.value(i) * y.factor});
+  const bool thinned = series.minimum_size() == series.value_size() && series.maximum_size() == series.value_size();
+  for (int i = 0; i < series.value_size(); ++i) {
+    const double low = thinned ? series.minimum(i) : series.value(i), high = thinned ? series.maximum(i) : series.value(i);
+    rows += row({series.time(i), series.value(i) * y.factor, low * y.factor, high * y.factor});
+  }
   const double end = series.time_size() ? series.time(series.time_size() - 1) : 0;
   const auto* monitor = monitor_of(value, series.name());
   const bool averaged = series.average().bins() > 0;
@@ -143,8 +148,9 @@ std::string series_panel(const v1::Series& series, const std::optional<v1::Case>
   const auto bins =
       averaged ? panel.block(row({from, mean, mean - half, mean + half}) + row({to, mean, mean - half, mean + half})) : "";
   if (interval) panel.draw(bins + " using 1:3:4 with filledcurves fc rgb \"" + band + "\" title \"95 % interval of the mean\"");
-  panel.draw(panel.block(rows.empty() ? row({NAN, NAN}) : rows) + " using 1:2 with lines lw 1.3 lc rgb \"" + ours +
-             "\" title \"bedflow\"");
+  const auto samples = panel.block(rows.empty() ? row({NAN, NAN, NAN, NAN}) : rows);
+  if (thinned) panel.draw(samples + " using 1:3:4 with filledcurves fc rgb \"" + ours + "\" fs transparent solid 0.35 notitle");
+  panel.draw(samples + " using 1:2 with lines lw 1.3 lc rgb \"" + ours + "\" title \"bedflow\"");
   if (averaged) {
     const std::string title =
         "mean of " + std::to_string(series.average().bins()) + (series.average().bins() == 1 ? " bin" : " bins");

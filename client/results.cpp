@@ -9,9 +9,6 @@
 
 namespace bedflow::client {
 
-namespace {
-
-// Newest first.
 std::vector<std::filesystem::path> checkpoints_of(const std::filesystem::path& folder, std::optional<std::uint64_t> step) {
   std::vector<std::filesystem::path> files;
   std::error_code error;
@@ -25,8 +22,6 @@ std::vector<std::filesystem::path> checkpoints_of(const std::filesystem::path& f
   std::sort(files.rbegin(), files.rend());
   return files;
 }
-
-}  // namespace
 
 bool is_job_folder(const std::filesystem::path& path) {
   return std::filesystem::exists(path / "case.txtpb");
@@ -63,8 +58,26 @@ v1::Statistics Results::statistics(const StatisticsQuery& query) const {
   for (const auto& name : query.names) request.add_names(name);
   if (query.from_time) request.set_from_time(*query.from_time);
   if (query.to_time) request.set_to_time(*query.to_time);
+  if (query.from_step) request.set_from_step(*query.from_step);
+  if (query.to_step) request.set_to_step(*query.to_step);
   if (query.most > 0) request.set_most(query.most);
   return Connection(server_).call(&Stub::QueryStatistics, request, 60);
+}
+
+std::vector<v1::SeriesInfo> Results::series() const {
+  if (!folder_.empty()) {
+    try {
+      StatisticsLog log(folder_ / "statistics.log");
+      log.update();
+      return log.series();
+    } catch (const std::runtime_error& error) {
+      throw Failure(Exit::corrupt, error.what());
+    }
+  }
+  v1::ListSeriesRequest request;
+  request.set_id(id_);
+  const auto response = Connection(server_).call(&Stub::ListSeries, request, 60);
+  return {response.series().begin(), response.series().end()};
 }
 
 std::optional<v1::Case> Results::effective_case() const {

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "bedflow/v1/results.pb.h"
 #include "connection.h"
@@ -17,6 +18,7 @@ class Results {
   Results(const std::string& job, const std::string& server);
 
   v1::Statistics statistics(const StatisticsQuery& query) const;
+  std::vector<v1::SeriesInfo> series() const;  // and profiles
   std::optional<v1::Case> effective_case() const;
   // From the newest checkpoint that is good, or the one of a step; at most so many particles.
   v1::Snapshot snapshot(std::optional<std::uint64_t> step, std::uint32_t most) const;
@@ -29,6 +31,9 @@ class Results {
   std::string id_;
   std::string server_;
 };
+
+// Of a job folder, newest first; of a step if one is named.
+std::vector<std::filesystem::path> checkpoints_of(const std::filesystem::path& folder, std::optional<std::uint64_t> step);
 
 bool is_job_folder(const std::filesystem::path& path);
 

@@ -102,9 +102,21 @@ void print_statistics(const v1::Statistics& statistics, Format format) {
 }
 
 void print_samples(const v1::Statistics& statistics, Format format) {
-  Table table({"name", "step", "time_s", "value"});
-  for (const auto& one : statistics.series()) {
-    for (int i = 0; i < one.value_size(); ++i) table.add({one.name(), one.step(i), one.time(i), one.value(i)});
+  const auto& all = statistics.series();
+  const bool thinned = std::any_of(all.begin(), all.end(), [](const v1::Series& one) { return one.samples_size() > 0; });
+  std::vector<std::string> columns = {"name", "step", "time_s", "value"};
+  if (thinned) columns.insert(columns.end(), {"minimum", "maximum", "samples"});
+  Table table(columns);
+  for (const auto& one : all) {
+    for (int i = 0; i < one.value_size(); ++i) {
+      std::vector<Cell> row = {one.name(), one.step(i), one.time(i), one.value(i)};
+      if (i < one.samples_size()) {
+        row.insert(row.end(), {one.minimum(i), one.maximum(i), std::uint64_t{one.samples(i)}});
+      } else if (thinned) {
+        row.insert(row.end(), {one.value(i), one.value(i), std::uint64_t{1}});
+      }
+      table.add(std::move(row));
+    }
   }
   print_data(table.text(format));
 }

@@ -13,7 +13,7 @@ std::string estimate_text(const v1::Estimate& estimate);
 
 void print_statistics(const v1::Statistics& statistics, Format format);
 
-// The samples of the series themselves: name, step, time, value.
+// The samples of the series themselves: name, step, time, value; of groups minimum, maximum and number too.
 void print_samples(const v1::Statistics& statistics, Format format);
 
 }  // namespace bedflow::client

@@ -16,12 +16,14 @@ struct Program {
   std::function<Exit()> verb;  // what was asked for
 };
 
-void add_case_verbs(CLI::App& app, Program& program);    // init, validate, reference, explain
-void add_run_verb(CLI::App& app, Program& program);      // run
-void add_job_verbs(CLI::App& app, Program& program);     // submit, list, get, cancel, suspend, resume
-void add_watch_verbs(CLI::App& app, Program& program);   // watch, wait, logs
-void add_result_verbs(CLI::App& app, Program& program);  // stats, plot, render
-void add_server_verbs(CLI::App& app, Program& program);  // checkpoint, server
+void add_case_verbs(CLI::App& app, Program& program);        // init, validate, reference, explain
+void add_run_verb(CLI::App& app, Program& program);          // run
+void add_job_verbs(CLI::App& app, Program& program);         // submit, list, get, cancel, suspend, resume, delete
+void add_watch_verbs(CLI::App& app, Program& program);       // watch, wait, logs
+void add_result_verbs(CLI::App& app, Program& program);      // stats, plot, render
+void add_field_verbs(CLI::App& app, Program& program);       // field
+void add_checkpoint_verbs(CLI::App& app, Program& program);  // checkpoint
+void add_server_verbs(CLI::App& app, Program& program);      // server
 
 // The verb's function is called once the whole line has been parsed.
 template <class Options>

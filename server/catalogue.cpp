@@ -208,6 +208,13 @@ void Catalogue::update(const JobRecord& record) {
   job.bind(record.number).step();
 }
 
+void Catalogue::erase(const std::string& id) {
+  Transaction transaction(database_.get());
+  Statement(database_.get(), "DELETE FROM requests WHERE job = ?").bind(id).step();
+  Statement(database_.get(), "DELETE FROM jobs WHERE id = ?").bind(id).step();
+  transaction.commit();
+}
+
 std::optional<JobRecord> Catalogue::find(const std::string& id) const {
   Statement row(database_.get(), select("WHERE id = ?"));
   if (!row.bind(id).step()) return std::nullopt;

@@ -38,6 +38,7 @@ class Catalogue {
   void insert(JobRecord& record, const std::string& request_id, const std::string& content);
   std::string content(const JobRecord& record) const;  // empty: created before content was kept for every job
   void update(const JobRecord& record);
+  void erase(const std::string& id);  // its request ids are forgotten too; nothing if there is no such job
 
   std::optional<JobRecord> find(const std::string& id) const;
   std::vector<JobRecord> in_states(const std::vector<v1::JobState>& states, std::int64_t most = -1) const;  // oldest first

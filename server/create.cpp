@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "case_difference.h"
 #include "case_file.h"
 #include "jobs.h"
 #include "refusal.h"
@@ -69,7 +70,14 @@ void Jobs::start_from(v1::CreateJobRequest& request, JobRecord& record) const {
   record.from_step = existing_step(folder, source.job(), source.has_step() ? std::optional(source.step()) : std::nullopt);
   record.job.set_start_from_job(source.job());
   record.job.set_start_from_step(*record.from_step);
-  if (!request.has_case_()) *request.mutable_case_() = case_of(found);
+  const v1::Case before = case_of(found);
+  if (!request.has_case_()) *request.mutable_case_() = before;
+  for (const auto& difference : differences(before, request.case_())) {
+    auto& override_made = *record.job.add_overrides();
+    override_made.set_path(difference.path);
+    override_made.set_from(difference.first);
+    override_made.set_to(difference.second);
+  }
 }
 
 v1::Case Jobs::case_of(const JobRecord& record) const {
@@ -100,13 +108,7 @@ v1::CreateJobResponse Jobs::create(const v1::CreateJobRequest& asked) {
   }
   if (!request.has_case_())
     throw Refusal(Refused::bad_request, "the request has neither a case nor start_from", "bedflow init mueller");
-  auto faults = check_case_fields(request.case_());
-  for (auto& fault : check_spec(request.spec(), settings_.slots)) faults.push_back(std::move(fault));
-  if (!faults.empty()) {
-    throw Refusal(Refused::invalid_case,
-                  std::to_string(faults.size()) + (faults.size() == 1 ? " fault" : " faults") + " in the case",
-                  "bedflow validate CASE", std::move(faults));
-  }
+  require_sound(request, settings_.slots);
   v1::CreateJobResponse response;
   *response.mutable_plan() = planner_.plan(case_text(request.case_()), request.spec().ranks());
   if (request.validate_only()) return response;
@@ -115,14 +117,18 @@ v1::CreateJobResponse Jobs::create(const v1::CreateJobRequest& asked) {
   return committed;
 }
 
-v1::CreateJobResponse Jobs::commit(JobRecord& record, const v1::CreateJobRequest& request, const std::string& content) {
-  record.job.set_id(new_job_id());
-  record.job.set_state(v1::PENDING);
+v1::CreateJobResponse Jobs::commit(JobRecord& record, const v1::CreateJobRequest& request, const std::string& content,
+                                   const JobFolder* imported) {
+  if (!imported) {
+    record.job.set_id(new_job_id());
+    record.job.set_state(v1::PENDING);
+  }
   record.job.set_case_name(request.case_().name());
   *record.job.mutable_spec() = request.spec();
   record.job.set_created_unix_nanos(now_nanos());
   record.job.set_changed_unix_nanos(record.job.created_unix_nanos());
   std::optional<DraftFolder> draft;
+  if (imported) write_folder(*imported, case_text(request.case_()), request.spec());
   if (record.from_step) {
     const JobFolder& folder = draft.emplace(settings_.data / "drafts" / record.job.id()).folder;
     write_folder(folder, case_text(request.case_()), request.spec());
@@ -134,9 +140,9 @@ v1::CreateJobResponse Jobs::commit(JobRecord& record, const v1::CreateJobRequest
   }
   const std::lock_guard guard(mutex_);
   if (auto earlier = earlier_answer(request, content)) return *earlier;  // a retry has overtaken us
-  if (draft) move_into_place(draft->folder, folder_of(record.job.id()));
+  if (const JobFolder* folder = draft ? &draft->folder : imported) move_into_place(*folder, folder_of(record.job.id()));
   catalogue_.insert(record, request.request_id(), content);
-  spdlog::info("{} is PENDING: case {}, {} ranks", record.job.id(), printable(record.job.case_name()), request.spec().ranks());
+  spdlog::info("{} is {}: case {}, {} ranks", record.job.id(), state_word(record.job.state()), printable(record.job.case_name()), request.spec().ranks());
   notifier_.poke();
   v1::CreateJobResponse response;
   *response.mutable_job() = view(record);

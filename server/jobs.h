@@ -17,6 +17,7 @@
 #include "attempt.h"
 #include "catalogue.h"
 #include "executor.h"
+#include "folder.h"
 #include "follow.h"
 #include "planner.h"
 #include "states.h"
@@ -46,6 +47,11 @@ class Jobs {
   v1::Job cancel(const std::string& id, bool skip_checkpoint);
   v1::Job suspend(const std::string& id);
   v1::Job resume(const v1::ResumeJobRequest& request);
+  std::uint64_t remove(const std::string& id);  // the bytes that are free again
+  DraftFolder new_draft() const;
+  // A suspended job of a draft with a case and a checkpoint. crc: of the file that was sent.
+  v1::Job import(const v1::ImportCheckpointRequest::Head& head, const JobFolder& draft, const v1::CheckpointReport& report,
+                 std::uint32_t crc);
   v1::Checkpoint create_checkpoint(const std::string& id, std::chrono::duration<double> limit);
   v1::ServerInfo info();
   JobFolder folder(const std::string& id);    // of a job that exists; it may not have been laid out yet
@@ -84,6 +90,7 @@ class Jobs {
   v1::Case case_of(const JobRecord& record) const;
   void lay_out(const JobRecord& record) const;
 
+  void finish_removals();
   void adopt();
   void look_at(Live& live);
   void end(Live& live);

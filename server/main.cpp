@@ -37,6 +37,8 @@ struct Options {
   double idle_seconds = 10;
   double bookmark_seconds = 10;
   double heartbeat_seconds = 30;
+  ReaderSettings reader;
+  std::uint32_t reader_seconds = 60;
 };
 
 // One server a data folder. Kept until the process ends.
@@ -103,7 +105,8 @@ int serve(const Options& options) {
   std::string address = listen_address(options.listen);
   Jobs jobs(options.settings);
   Watchers watchers(std::chrono::milliseconds(static_cast<int>(1000 * options.bookmark_seconds)));
-  JobService service(jobs, watchers, options.settings.programs.engine, address);
+  Readers readers(options.reader);
+  JobService service(jobs, watchers, readers, options.settings.programs.engine, address);
   int port = 0;
   const auto server = listen(address, service, port);
   if (!address.starts_with("unix:")) address = address.substr(0, address.rfind(':') + 1) + std::to_string(port);
@@ -114,10 +117,12 @@ int serve(const Options& options) {
   std::atomic<bool> ending = false;
   std::thread supervisor([&] { supervise(jobs, watchers, ending); });
   const std::chrono::duration<double> patience(options.idle_seconds);
-  wait_for_end(signals,
-               [&] { return options.idle_exit && service.quiet() > patience && watchers.count() == 0 && jobs.is_idle(); });
+  wait_for_end(signals, [&] {
+    return options.idle_exit && service.quiet() > patience && service.calls() + watchers.count() == 0 && jobs.is_idle();
+  });
   spdlog::info("going down; what runs goes on running");
   watchers.drain();
+  service.drain();
   jobs.stop_waiting();
   // Idle connections are not waited for, only calls.
   const auto deadline = std::chrono::steady_clock::now() + 2s;
@@ -139,10 +144,18 @@ void add_server_options(CLI::App& app, Options& options) {
   settings.slots = std::max(4U, std::thread::hardware_concurrency());
   settings.programs.server = own_path();
   settings.programs.engine = own_path().parent_path() / "bedflow-engine";
+  options.reader.program = own_path().parent_path() / "bedflow-reader";
   app.add_option("--data", settings.data, "folder of the jobs and their catalogue; made private (mode 0700)");
   app.add_option("--listen", options.listen, "unix:PATH or 127.0.0.1:PORT; unix:DATA/bedflowd.sock if absent");
   app.add_option("--slots", settings.slots, "ranks that may run at once")->capture_default_str()->check(CLI::Range(1, 100'000));
   app.add_option("--engine", settings.programs.engine, "the engine")->capture_default_str();
+  app.add_option("--reader", options.reader.program, "opens checkpoints")->capture_default_str();
+  app.add_option("--reader-memory-mib", options.reader.memory_mib, "memory that one question about a checkpoint may take, MiB")
+      ->capture_default_str()
+      ->check(CLI::Range(64, 1 << 30));
+  app.add_option("--reader-seconds", options.reader_seconds, "time that one question about a checkpoint may take, s")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 86'400));
   app.add_option("--mpirun", settings.programs.mpirun, "starts engines of more than one rank")->capture_default_str();
   app.add_flag("--idle-exit", options.idle_exit, "end when no job waits or runs and no call has come for a while");
   app.add_option("--idle-seconds", options.idle_seconds, "that while, s")->capture_default_str()->check(CLI::Range(0.1, 1e6));
@@ -182,6 +195,7 @@ int run(int argc, char** argv) {
   if (options.settings.data.empty())
     throw std::invalid_argument("--data is missing: the folder of the jobs, e.g. --data ./bedflow-data");
   options.settings.data = fs::absolute(options.settings.data).lexically_normal();
+  options.reader.time = std::chrono::seconds(options.reader_seconds);
   options.settings.heartbeat_limit = std::chrono::seconds(static_cast<int>(options.heartbeat_seconds));
   if (options.listen.empty()) options.listen = "unix:" + (options.settings.data / "bedflowd.sock").string();
   return serve(options);

@@ -17,6 +17,7 @@
 #include <iterator>
 #include <sstream>
 #include <system_error>
+#include <utility>
 
 namespace bedflow::server {
 namespace {
@@ -42,11 +43,12 @@ class Pipe {
   }
   ~Pipe() {
     close_writer();
-    ::close(ends_[0]);
+    if (ends_[0] >= 0) ::close(ends_[0]);
   }
   Pipe(const Pipe&) = delete;
   Pipe& operator=(const Pipe&) = delete;
   int reader() const { return ends_[0]; }
+  int release_reader() { return std::exchange(ends_[0], -1); }
   int writer() const { return ends_[1]; }
   void close_writer() {
     if (ends_[1] >= 0) ::close(ends_[1]);
@@ -155,6 +157,53 @@ Answer ask(const std::vector<std::string>& command, std::chrono::milliseconds li
     ::kill(child, SIGKILL);
   }
   answer.exit_code = wait_for_exit(child);
+  return answer;
+}
+
+Child::Child(const std::vector<std::string>& command) {
+  Pipe output, error;
+  pid_ = launch({.command = command, .environment = {}, .output = output.writer(), .error = error.writer()});
+  output_ = output.release_reader();
+  error_ = error.release_reader();
+}
+
+Child::~Child() {
+  if (pid_ > 0) {
+    ::kill(pid_, SIGKILL);
+    wait_for_exit(pid_);
+  }
+  ::close(output_);
+  ::close(error_);
+}
+
+std::string Child::read(std::size_t bytes, Deadline deadline) {
+  std::string text(bytes, '\0');
+  std::size_t have = 0;
+  while (have < bytes) {
+    pollfd pipe{output_, POLLIN, 0};
+    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now()).count();
+    const int ready = left <= 0 ? 0 : ::poll(&pipe, 1, static_cast<int>(left));
+    if (ready < 0 && errno == EINTR) continue;
+    if (ready <= 0) break;
+    const ssize_t got = ::read(output_, text.data() + have, bytes - have);
+    if (got < 0 && errno == EINTR) continue;
+    if (got <= 0) break;
+    have += static_cast<std::size_t>(got);
+  }
+  text.resize(have);
+  return text;
+}
+
+Answer Child::end(Deadline deadline) {
+  Answer answer;
+  if (!has_ended_by(pid_, deadline)) {
+    answer.timed_out = true;
+    ::kill(pid_, SIGKILL);
+  }
+  answer.exit_code = wait_for_exit(std::exchange(pid_, -1));
+  std::array<char, 4096> text;
+  const ssize_t got = ::read(error_, text.data(), text.size());  // all that it said is in the pipe: it has ended
+  if (got > 0) answer.error.assign(text.data(), static_cast<std::size_t>(got));
   return answer;
 }
 

@@ -32,6 +32,25 @@ struct Answer {
 // Runs a command to its end; kills it after `limit` or when it says more than `most_bytes`.
 Answer ask(const std::vector<std::string>& command, std::chrono::milliseconds limit, std::size_t most_bytes);
 
+// A child whose output is read as it comes. Killed with its owner.
+class Child {
+ public:
+  using Deadline = std::chrono::steady_clock::time_point;
+  explicit Child(const std::vector<std::string>& command);  // throws std::system_error
+  ~Child();
+  Child(const Child&) = delete;
+  Child& operator=(const Child&) = delete;
+
+  // So many bytes of its output; fewer when it ends before or the time is over.
+  std::string read(std::size_t bytes, Deadline deadline);
+  // After its output: waits for its end, kills it when the time is over. error: what it said there, at most 4 KiB.
+  Answer end(Deadline deadline);
+
+ private:
+  pid_t pid_ = -1;
+  int output_ = -1, error_ = -1;
+};
+
 int wait_for_exit(pid_t child);  // exit code, or 128 + signal
 
 // Field 22 of /proc/<pid>/stat; nothing when there is no such process or it is a zombie.

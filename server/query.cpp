@@ -2,9 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <map>
-#include <stdexcept>
 #include <string>
 #include <system_error>
 
@@ -13,7 +11,6 @@
 #include "record_log.h"
 #include "refusal.h"
 #include "security.h"
-#include "statistics_file.h"
 
 namespace bedflow::server {
 namespace {
@@ -50,21 +47,29 @@ v1::ListCheckpointsResponse list_checkpoints(const JobFolder& folder, const std:
   return response;
 }
 
-v1::Statistics query_statistics(const JobFolder& folder, const v1::QueryStatisticsRequest& request) {
-  StatisticsQuery query{{request.names().begin(), request.names().end()}, {}, {}, request.most()};
-  if (request.has_from_time()) query.from_time = request.from_time();
-  if (request.has_to_time()) query.to_time = request.to_time();
-  if (std::isnan(request.from_time()) || std::isnan(request.to_time())) {
-    throw Refusal(Refused::bad_request, "from_time and to_time must be numbers");
-  }
-  if (!std::filesystem::exists(folder.statistics())) return {};  // not begun
-  try {
-    return read_statistics(folder.statistics(), query);
-  } catch (const std::out_of_range& unknown) {
-    throw Refusal(Refused::series_not_found, unknown.what(), "bedflow stats " + request.id());
-  } catch (const std::runtime_error& damaged) {
-    throw Refusal(Refused::log_damaged, damaged.what(), "bedflow logs " + request.id());
-  }
+v1::Checkpoint get_checkpoint(Readers& readers, const JobFolder& folder, const v1::CheckpointName& name) {
+  v1::Checkpoint checkpoint;
+  with_checkpoint(folder, name, [&](std::uint64_t step, const std::filesystem::path& file) {
+    auto& content = *checkpoint.mutable_content() = readers.describe(file);
+    checkpoint.set_job(name.job());
+    checkpoint.set_step(step);
+    checkpoint.set_time(content.time());
+    checkpoint.set_bytes(content.bytes());
+    checkpoint.set_file(JobFolder::checkpoint_name(step));
+  });
+  return checkpoint;
+}
+
+v1::VerifyCheckpointResponse verify_checkpoint(Readers& readers, const JobFolder& folder, const v1::CheckpointName& name) {
+  v1::VerifyCheckpointResponse response;
+  with_checkpoint(folder, name, [&](std::uint64_t step, const std::filesystem::path& file) {
+    response.set_job(name.job());
+    response.set_step(step);
+    response.set_bytes(std::filesystem::file_size(file));
+    for (auto& fault : readers.verify(file)) *response.add_faults() = std::move(fault);
+    response.set_good(response.faults().empty());
+  });
+  return response;
 }
 
 v1::Snapshot snapshot(const std::filesystem::path& engine, const JobFolder& folder, const v1::GetSnapshotRequest& request) {

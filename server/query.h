@@ -5,14 +5,18 @@
 
 #include "bedflow/v1/service.pb.h"
 #include "folder.h"
+#include "reader.h"
 
 namespace bedflow::server {
 
 // Newest first. The time is that of the event that reported the checkpoint.
 v1::ListCheckpointsResponse list_checkpoints(const JobFolder& folder, const std::string& id);
 
-// Throws Refusal: series_not_found with the names there are, bad_request, log_damaged.
-v1::Statistics query_statistics(const JobFolder& folder, const v1::QueryStatisticsRequest& request);
+// With what it holds. Throws Refusal: checkpoint_not_found, checkpoint_corrupt and what Readers throw.
+v1::Checkpoint get_checkpoint(Readers& readers, const JobFolder& folder, const v1::CheckpointName& name);
+
+// Of the checkpoint that is named, or the newest, good or not. Throws Refusal: checkpoint_not_found, and what Readers throw.
+v1::VerifyCheckpointResponse verify_checkpoint(Readers& readers, const JobFolder& folder, const v1::CheckpointName& name);
 
 // Of the checkpoint named, or of the newest that is good. Throws Refusal: checkpoint_not_found, checkpoint_corrupt,
 // backend_error.

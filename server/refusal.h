@@ -20,6 +20,10 @@ enum class Refused {
   request_id_reused,     // the same id with another content
   timed_out,             // not within the time given
   checkpoint_corrupt,    //
+  checkpoint_changed,    // it is not the one that a download began with
+  bad_upload,            // what was sent is not what was announced
+  reader_failed,         // the process that was to read a checkpoint crashed
+  too_much,              // more memory, time or bytes than one call is given, or too many such calls at once
   log_damaged,           // a record in the middle of a job's log
   disk_full,             //
   going_down,            // the server, not the job

@@ -39,6 +39,14 @@ Code code_of(Refused why) {
       return {grpc::StatusCode::DEADLINE_EXCEEDED, "TIMED_OUT"};
     case Refused::checkpoint_corrupt:
       return {grpc::StatusCode::DATA_LOSS, "CHECKPOINT_CORRUPT"};
+    case Refused::checkpoint_changed:
+      return {grpc::StatusCode::FAILED_PRECONDITION, "CHECKPOINT_CHANGED"};
+    case Refused::bad_upload:
+      return {grpc::StatusCode::INVALID_ARGUMENT, "BAD_UPLOAD"};
+    case Refused::reader_failed:
+      return {grpc::StatusCode::INTERNAL, "READER_FAILED"};
+    case Refused::too_much:
+      return {grpc::StatusCode::RESOURCE_EXHAUSTED, "TOO_MUCH"};
     case Refused::log_damaged:
       return {grpc::StatusCode::DATA_LOSS, "LOG_DAMAGED"};
     case Refused::disk_full:
@@ -49,17 +57,6 @@ Code code_of(Refused why) {
       return {grpc::StatusCode::INTERNAL, "BACKEND_ERROR"};
   }
   return {grpc::StatusCode::INTERNAL, "INTERNAL"};
-}
-
-grpc::Status status_of_failure(const std::exception& failure) {
-  const auto* system = dynamic_cast<const std::system_error*>(&failure);
-  if (system && system->code() == std::errc::no_space_on_device) {
-    return status_of({Refused::disk_full, failure.what(), "bedflow server info"});
-  }
-  spdlog::error("call failed: {}", failure.what());
-  v1::ErrorDetail detail;
-  detail.set_reason("INTERNAL");
-  return {grpc::StatusCode::INTERNAL, failure.what(), detail.SerializeAsString()};
 }
 
 // A stream that is refused.
@@ -86,6 +83,18 @@ grpc::Status status_of(const Refusal& refusal) {
   return {code.status, std::string(refusal.what()).substr(0, 1024), detail.SerializeAsString()};
 }
 
+grpc::Status status_of_failure(const std::exception& failure) {
+  if (const auto* refusal = dynamic_cast<const Refusal*>(&failure)) return status_of(*refusal);
+  const auto* system = dynamic_cast<const std::system_error*>(&failure);
+  if (system && system->code() == std::errc::no_space_on_device) {
+    return status_of({Refused::disk_full, failure.what(), "bedflow server info"});
+  }
+  spdlog::error("call failed: {}", failure.what());
+  v1::ErrorDetail detail;
+  detail.set_reason("INTERNAL");
+  return {grpc::StatusCode::INTERNAL, failure.what(), detail.SerializeAsString()};
+}
+
 JobService::Unary* JobService::answer(Context* context, Pace pace, std::function<void()> call) {
   last_call_ = std::chrono::steady_clock::now();
   ++calls_;
@@ -94,8 +103,6 @@ JobService::Unary* JobService::answer(Context* context, Pace pace, std::function
     grpc::Status status;
     try {
       call();
-    } catch (const Refusal& refusal) {
-      status = status_of(refusal);
     } catch (const std::exception& failure) {
       status = status_of_failure(failure);
     }
@@ -133,8 +140,6 @@ grpc::ServerWriteReactor<v1::WatchJobResponse>* JobService::WatchJob(Context*, c
   last_call_ = std::chrono::steady_clock::now();
   try {
     return watchers_.open(request->id(), jobs_.watch(request->id(), request->after_sequence(), request->from_now()));
-  } catch (const Refusal& refusal) {
-    return new Refuse(status_of(refusal));
   } catch (const std::exception& failure) {
     return new Refuse(status_of_failure(failure));
   }
@@ -154,7 +159,28 @@ JobService::Unary* JobService::ResumeJob(Context* context, const v1::ResumeJobRe
 
 JobService::Unary* JobService::QueryStatistics(Context* context, const v1::QueryStatisticsRequest* request,
                                                v1::Statistics* response) {
-  return answer(context, Pace::slow, [=, this] { *response = query_statistics(jobs_.folder(request->id()), *request); });
+  return answer(context, Pace::slow, [=, this] { *response = statistics_.query(jobs_.folder(request->id()), *request); });
+}
+
+JobService::Unary* JobService::ListSeries(Context* context, const v1::ListSeriesRequest* request,
+                                          v1::ListSeriesResponse* response) {
+  return answer(context, Pace::slow, [=, this] { *response = statistics_.list(jobs_.folder(request->id()), request->id()); });
+}
+
+JobService::Unary* JobService::DeleteJob(Context* context, const v1::DeleteJobRequest* request, v1::DeleteJobResponse* response) {
+  return answer(context, Pace::slow, [=, this] { response->set_freed_bytes(jobs_.remove(request->id())); });
+}
+
+JobService::Unary* JobService::GetCheckpoint(Context* context, const v1::GetCheckpointRequest* request,
+                                             v1::Checkpoint* response) {
+  return answer(context, Pace::slow,
+                [=, this] { *response = get_checkpoint(readers_, jobs_.folder(request->name().job()), request->name()); });
+}
+
+JobService::Unary* JobService::VerifyCheckpoint(Context* context, const v1::VerifyCheckpointRequest* request,
+                                                v1::VerifyCheckpointResponse* response) {
+  return answer(context, Pace::slow,
+                [=, this] { *response = verify_checkpoint(readers_, jobs_.folder(request->name().job()), request->name()); });
 }
 
 JobService::Unary* JobService::ListCheckpoints(Context* context, const v1::ListCheckpointsRequest* request,

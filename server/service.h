@@ -12,22 +12,26 @@
 
 #include "bedflow/v1/service.grpc.pb.h"
 #include "jobs.h"
+#include "reader.h"
 #include "refusal.h"
+#include "statistics.h"
 #include "watch.h"
 
 namespace bedflow::server {
 
 // Code, message, and v1::ErrorDetail in the details. Faults beyond what gRPC's headers hold are counted, not sent.
 grpc::Status status_of(const Refusal& refusal);
+grpc::Status status_of_failure(const std::exception& failure);  // of a Refusal too
 
 class JobService final : public v1::JobService::CallbackService {
  public:
-  JobService(Jobs& jobs, Watchers& watchers, std::filesystem::path engine, std::string address)
-      : jobs_(jobs), watchers_(watchers), engine_(std::move(engine)), address_(std::move(address)) {}
+  JobService(Jobs& jobs, Watchers& watchers, Readers& readers, std::filesystem::path engine, std::string address)
+      : jobs_(jobs), watchers_(watchers), readers_(readers), engine_(std::move(engine)), address_(std::move(address)) {}
   ~JobService() override { wait_for_calls(); }
 
   void wait_for_calls();                              // after the gRPC server's shutdown
-  std::size_t calls() const { return calls_; }        // in progress, streams not counted
+  void drain() { draining_ = true; }                  // streams of statistics end: the server goes down
+  std::size_t calls() const { return calls_; }        // in progress, watchers not counted
   std::chrono::steady_clock::duration quiet() const;  // since the last call
 
  private:
@@ -36,6 +40,8 @@ class JobService final : public v1::JobService::CallbackService {
   enum class Pace { quick, slow };  // slow: asks the engine, or waits for it
 
   Unary* answer(Context* context, Pace pace, std::function<void()> call);
+  template <class Response, class Source>
+  grpc::ServerWriteReactor<Response>* stream(Context* context, Source source);
 
   Unary* CreateJob(Context*, const v1::CreateJobRequest*, v1::CreateJobResponse*) override;
   Unary* GetJob(Context*, const v1::GetJobRequest*, v1::Job*) override;
@@ -44,18 +50,30 @@ class JobService final : public v1::JobService::CallbackService {
   Unary* CancelJob(Context*, const v1::CancelJobRequest*, v1::Job*) override;
   Unary* SuspendJob(Context*, const v1::SuspendJobRequest*, v1::Job*) override;
   Unary* ResumeJob(Context*, const v1::ResumeJobRequest*, v1::Job*) override;
+  Unary* DeleteJob(Context*, const v1::DeleteJobRequest*, v1::DeleteJobResponse*) override;
+  Unary* ListSeries(Context*, const v1::ListSeriesRequest*, v1::ListSeriesResponse*) override;
   Unary* QueryStatistics(Context*, const v1::QueryStatisticsRequest*, v1::Statistics*) override;
+  grpc::ServerWriteReactor<v1::StreamStatisticsResponse>* StreamStatistics(Context*, const v1::StreamStatisticsRequest*) override;
   Unary* ListCheckpoints(Context*, const v1::ListCheckpointsRequest*, v1::ListCheckpointsResponse*) override;
+  Unary* GetCheckpoint(Context*, const v1::GetCheckpointRequest*, v1::Checkpoint*) override;
   Unary* CreateCheckpoint(Context*, const v1::CreateCheckpointRequest*, v1::Checkpoint*) override;
+  Unary* VerifyCheckpoint(Context*, const v1::VerifyCheckpointRequest*, v1::VerifyCheckpointResponse*) override;
+  grpc::ServerWriteReactor<v1::DownloadCheckpointResponse>* DownloadCheckpoint(Context*,
+                                                                               const v1::DownloadCheckpointRequest*) override;
+  grpc::ServerReadReactor<v1::ImportCheckpointRequest>* ImportCheckpoint(Context*, v1::Job*) override;
+  grpc::ServerWriteReactor<v1::FieldAnswer>* QueryField(Context*, const v1::QueryFieldRequest*) override;
   Unary* GetSnapshot(Context*, const v1::GetSnapshotRequest*, v1::Snapshot*) override;
   Unary* GetServerInfo(Context*, const v1::GetServerInfoRequest*, v1::ServerInfo*) override;
 
   Jobs& jobs_;
   Watchers& watchers_;
+  Readers& readers_;
+  StatisticsLogs statistics_;
   const std::filesystem::path engine_;
   const std::string address_;
   std::atomic<std::chrono::steady_clock::time_point> last_call_ = std::chrono::steady_clock::now();
   std::atomic<std::size_t> calls_ = 0;
+  std::atomic<bool> draining_ = false;
   boost::asio::thread_pool quick_{4};
   boost::asio::thread_pool slow_{16};
 };

@@ -68,4 +68,12 @@ std::vector<v1::Fault> check_case_fields(const v1::Case& value) {
   return std::move(faults).list();
 }
 
+void require_sound(const v1::CreateJobRequest& request, std::uint32_t slots) {
+  auto faults = check_case_fields(request.case_());
+  for (auto& fault : check_spec(request.spec(), slots)) faults.push_back(std::move(fault));
+  if (faults.empty()) return;
+  const std::string count = std::to_string(faults.size()) + (faults.size() == 1 ? " fault" : " faults");
+  throw Refusal(Refused::invalid_case, count + " in the case", "bedflow validate CASE", std::move(faults));
+}
+
 }  // namespace bedflow::server

@@ -14,4 +14,7 @@ std::vector<v1::Fault> check_spec(const v1::JobSpec& spec, std::uint32_t slots);
 // All faults of the case by its schema; a case with fields that this server does not know is refused too.
 std::vector<v1::Fault> check_case_fields(const v1::Case& value);
 
+// Both, of a job to be. Throws Refusal(invalid_case) with all faults.
+void require_sound(const v1::CreateJobRequest& request, std::uint32_t slots);
+
 }  // namespace bedflow::server

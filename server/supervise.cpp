@@ -47,6 +47,7 @@ Jobs::Jobs(Settings settings)
   std::filesystem::create_directories(settings_.data / "jobs");
   std::filesystem::remove_all(settings_.data / "drafts");  // submissions that were never acknowledged
   std::filesystem::create_directories(settings_.data / "drafts");
+  finish_removals();
   adopt();
 }
 

@@ -142,21 +142,69 @@ TEST_F(StatisticsFile, BinsOfStepsThatAResumeUndidAreGone) {
   EXPECT_EQ(read().step(), 3U);
 }
 
-TEST_F(StatisticsFile, ThinningKeepsPeaksOrderAndCount) {
+TEST_F(StatisticsFile, ThinningKeepsMinimumMaximumAndMean) {
   write_schema();
-  for (std::uint64_t step = 0; step < 100; ++step)
-    write_sample(step, step == 37 ? 1e3 : (step == 61 ? -1e3 : std::sin(0.3 * static_cast<double>(step))));
+  double sum = 0;
+  for (std::uint64_t step = 0; step < 103; ++step) {
+    const double value = step == 37 ? 1e3 : (step == 61 ? -1e3 : std::sin(0.3 * static_cast<double>(step)));
+    write_sample(step, value);
+    sum += value;
+  }
   StatisticsQuery query;
   query.most = 10;
   const v1::Statistics statistics = read(query);
   const v1::Series& found = statistics.series(0);
-  EXPECT_LE(found.value_size(), 10);
-  EXPECT_GE(found.value_size(), 6);
-  EXPECT_THAT(found.value(), testing::Contains(1e3));
-  EXPECT_THAT(found.value(), testing::Contains(-1e3));
+  ASSERT_EQ(found.value_size(), 10);
+  EXPECT_DOUBLE_EQ(*std::max_element(found.maximum().begin(), found.maximum().end()), 1e3);
+  EXPECT_DOUBLE_EQ(*std::min_element(found.minimum().begin(), found.minimum().end()), -1e3);
   EXPECT_TRUE(std::is_sorted(found.step().begin(), found.step().end()));
-  query.most = 100;
-  EXPECT_EQ(read(query).series(0).value_size(), 100);
+  EXPECT_EQ(found.step(9), 102U);
+  double kept = 0;
+  std::uint32_t samples = 0;
+  for (int i = 0; i < 10; ++i) {
+    kept += found.value(i) * found.samples(i);
+    samples += found.samples(i);
+    EXPECT_GE(found.samples(i), 10U);
+    EXPECT_LE(found.minimum(i), found.value(i));
+    EXPECT_GE(found.maximum(i), found.value(i));
+  }
+  EXPECT_EQ(samples, 103U);
+  EXPECT_NEAR(kept, sum, 1e-9);  // sums of 103 values, the largest 1000: round-off
+  query.most = 103;
+  EXPECT_EQ(read(query).series(0).value_size(), 103);
+  EXPECT_EQ(read(query).series(0).minimum_size(), 0);
+}
+
+TEST_F(StatisticsFile, StepsOfAQueryBoundItsSamples) {
+  write_schema();
+  for (std::uint64_t step = 0; step < 10; ++step) write_sample(step, 0);
+  StatisticsQuery query;
+  query.from_step = 7;
+  EXPECT_THAT(read(query).series(0).step(), ElementsAre(7U, 8U, 9U));
+  query.to_step = 8;
+  query.from_time = 0.75;
+  EXPECT_THAT(read(query).series(0).step(), ElementsAre(8U));
+  query.from_step = 9;
+  EXPECT_EQ(read(query).series(0).step_size(), 0);
+}
+
+TEST_F(StatisticsFile, IsFollowedAsItGrows) {
+  write_schema();
+  write_sample(1, 1);
+  StatisticsLog log(path_);
+  log.update();
+  EXPECT_EQ(log.series().at(0).samples(), 1U);
+  write_sample(2, 2);
+  write_sample(3, 3);
+  write_resumed(2);
+  write_sample(3, 4);
+  log.update();
+  EXPECT_THAT(log.answer({}).series(0).value(), ElementsAre(1, 2, 4));
+  const v1::SeriesInfo info = log.series().at(0);
+  EXPECT_EQ(info.samples(), 3U);
+  EXPECT_EQ(info.last_step(), 3U);
+  EXPECT_EQ(info.monitor().name(), "height");
+  EXPECT_TRUE(log.series().at(1).monitor().is_profile());
 }
 
 TEST_F(StatisticsFile, TimesOfAQueryBoundItsSamples) {
