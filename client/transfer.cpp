@@ -116,7 +116,10 @@ fs::path download_checkpoint(const Connection& connection, const v1::CheckpointN
         if (!part) part.emplace(file);
         bytes = response.bytes();
         if (part->seal() != response.seal() && part->have() > 0) part->forget();  // an older one of the same name: from the start
-        if (response.offset() != part->have()) break;
+        if (response.offset() != part->have()) {                                  // it is the whole that is wanted now
+          context.TryCancel();
+          break;
+        }
         part->begin(response);
       }
       take(*part, response);
@@ -124,7 +127,6 @@ fs::path download_checkpoint(const Connection& connection, const v1::CheckpointN
       calls.progress(part->have(), bytes);
     }
     if (part && bytes > 0 && part->have() == bytes) break;
-    context.TryCancel();
     const auto status = reader->Finish();
     const auto failure = connection.failure_of(status);
     v1::ErrorDetail detail;

@@ -85,7 +85,6 @@ class Importer final : public grpc::ServerReadReactor<v1::ImportCheckpointReques
   }
   void OnDone() override {
     stop_timer();
-    import_.reset();
     done_();
     self_.reset();
   }
@@ -104,13 +103,19 @@ class Importer final : public grpc::ServerReadReactor<v1::ImportCheckpointReques
     StartRead(&part_);
   }
 
+  // What was put together is gone before the client hears how it ended.
+  void end(const grpc::Status& status) {
+    import_.reset();
+    Finish(status);
+  }
+
   void go_on(bool has_part) {
-    if (context_->IsCancelled()) return Finish(grpc::Status::CANCELLED);
+    if (context_->IsCancelled()) return end(grpc::Status::CANCELLED);
     try {
       if (!has_part) {
         if (!import_) throw Refusal(Refused::bad_upload, "nothing came: the first message has the head");
         *response_ = import_->finish();
-        return Finish(grpc::Status::OK);
+        return end(grpc::Status::OK);
       }
       if (!import_) {
         if (!part_.has_head()) throw Refusal(Refused::bad_upload, "the first message has no head");
@@ -121,7 +126,7 @@ class Importer final : public grpc::ServerReadReactor<v1::ImportCheckpointReques
       if (part_.has_data()) import_->take(part_);
       read();
     } catch (const std::exception& failure) {
-      Finish(status_of_failure(failure));
+      end(status_of_failure(failure));
     }
   }
 

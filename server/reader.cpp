@@ -166,7 +166,9 @@ void with_checkpoint(const JobFolder& folder, const v1::CheckpointName& name,
         const bool gone = !std::filesystem::exists(file);
         if (refusal.why != Refused::checkpoint_corrupt && !gone) throw;
         vanished = vanished || gone;
-        faults += (faults.empty() ? "" : "; ") + JobFolder::checkpoint_name(step) + ": " + refusal.what();
+        std::string fault = refusal.what();  // the reader names the file by its whole path
+        if (const auto path = fault.find(file.string()); path != std::string::npos) fault.erase(path, file.string().size() + 2);
+        faults += (faults.empty() ? "" : "; ") + JobFolder::checkpoint_name(step) + ": " + fault;
       }
     }
     if (!vanished) break;

@@ -33,17 +33,18 @@ monitors {{ name: "kinetic_energy" kinetic_energy {{}} interval: {interval} }}
 monitors {{ name: "bed_height" bed_height {{}} interval: {interval} }}
 """
 
-# 27 000 particles at rest, no gas: checkpoints of several MiB in no time.
+# 64 000 particles at rest, no gas: checkpoints of several MiB in no time.
 CROWD = """
 name: "crowd"
 domain { size { x: 0.06 y: 0.06 z: 0.06 } }
+gravity {}
 particles {
   diameter: 0.001
   density: 2500
   linear_spring_dashpot { stiffness: 1000 restitution: 0.8 }
   spring { friction: 0.3 }
   symplectic_euler {}
-  lattice { spacing: 0.002 region { low {} high { x: 0.06 y: 0.06 z: 0.06 } } }
+  lattice { count { x: 40 y: 40 z: 40 } }
 }
 time { end: 0.0001 }
 """
@@ -70,6 +71,7 @@ class RealServer:
     def __exit__(self, *_):
         self.process.send_signal(signal.SIGTERM)
         self.process.wait(20)
+        self.process.stdout.close()
         self._folder.cleanup()
 
     def start(self):

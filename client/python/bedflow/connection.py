@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import os
 import pathlib
 from collections.abc import Callable, Iterator
@@ -13,6 +14,14 @@ from bedflow.v1 import service_pb2, service_pb2_grpc
 
 CALL_SECONDS = 60.0
 LARGEST_MESSAGE = 512 << 20
+
+# Calls that may be made twice: a server that has just been started again is asked again.
+_REPEATED = ("CreateJob", "GetJob", "ListJobs", "ListSeries", "QueryStatistics", "ListCheckpoints", "GetCheckpoint",
+             "VerifyCheckpoint", "DownloadCheckpoint", "QueryField", "GetSnapshot", "GetServerInfo")
+_SERVICE = json.dumps({"methodConfig": [{
+    "name": [{"service": "bedflow.v1.JobService", "method": method} for method in _REPEATED],
+    "retryPolicy": {"maxAttempts": 4, "initialBackoff": "0.1s", "maxBackoff": "0.5s", "backoffMultiplier": 2,
+                    "retryableStatusCodes": ["UNAVAILABLE"]}}]})
 
 
 def default_address() -> str:
@@ -65,7 +74,7 @@ class Connection:
         self.address = address
         options = [("grpc.max_receive_message_length", LARGEST_MESSAGE), ("grpc.enable_http_proxy", 0),
                    ("grpc.keepalive_time_ms", 30_000), ("grpc.initial_reconnect_backoff_ms", 100),
-                   ("grpc.min_reconnect_backoff_ms", 100), ("grpc.max_reconnect_backoff_ms", 1000)]
+                   ("grpc.min_reconnect_backoff_ms", 100), ("grpc.max_reconnect_backoff_ms", 1000), ("grpc.service_config", _SERVICE)]
         self._channel = grpc.insecure_channel(address, options)
         self.stub = service_pb2_grpc.JobServiceStub(self._channel)
 

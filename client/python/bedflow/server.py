@@ -87,15 +87,8 @@ class Server:
             request.start_from.job = start_from.id
             if step is not None:
                 request.start_from.step = step
-        for attempt in range(5):
-            try:
-                response = self._connection.call(self._connection.stub.CreateJob, request)
-                return Job(self._connection, response.job.id, response.job)
-            except Error as error:
-                if not may_come_back(error) or attempt == 4:
-                    raise
-                time.sleep(0.2 * (attempt + 1))
-        raise AssertionError("unreachable")
+        message = self._connection.call(self._connection.stub.CreateJob, request).job
+        return Job(self._connection, message.id, message)
 
     def plan(self, case: CaseLike, *, ranks: int = 1) -> Any:
         """Every check, and what the case requires (PlanReport); no job."""
