@@ -210,7 +210,7 @@ void Catalogue::update(const JobRecord& record) {
 
 void Catalogue::erase(const std::string& id) {
   Transaction transaction(database_.get());
-  Statement(database_.get(), "DELETE FROM requests WHERE job = ?").bind(id).step();
+  Statement(database_.get(), "DELETE FROM submissions WHERE number = (SELECT number FROM jobs WHERE id = ?)").bind(id).step();
   Statement(database_.get(), "DELETE FROM jobs WHERE id = ?").bind(id).step();
   transaction.commit();
 }

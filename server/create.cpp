@@ -142,7 +142,8 @@ v1::CreateJobResponse Jobs::commit(JobRecord& record, const v1::CreateJobRequest
   if (auto earlier = earlier_answer(request, content)) return *earlier;  // a retry has overtaken us
   if (const JobFolder* folder = draft ? &draft->folder : imported) move_into_place(*folder, folder_of(record.job.id()));
   catalogue_.insert(record, request.request_id(), content);
-  spdlog::info("{} is {}: case {}, {} ranks", record.job.id(), state_word(record.job.state()), printable(record.job.case_name()), request.spec().ranks());
+  spdlog::info("{} is {}: case {}, {} ranks", record.job.id(), state_word(record.job.state()), printable(record.job.case_name()),
+               request.spec().ranks());
   notifier_.poke();
   v1::CreateJobResponse response;
   *response.mutable_job() = view(record);

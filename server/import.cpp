@@ -9,6 +9,7 @@
 #include <optional>
 #include <utility>
 
+#include "case_file.h"
 #include "download.h"
 #include "refusal.h"
 #include "security.h"
@@ -177,8 +178,8 @@ v1::Job Jobs::import(const v1::ImportCheckpointRequest::Head& head, const JobFol
   record.job.set_id(draft.root().filename());
   record.job.set_state(v1::STATE_SUSPENDED);
   record.job.set_message("imported at step " + std::to_string(report.step()) + "; resume it, or start others from it");
-  plan_of(settings_.programs.engine, draft.case_file(), request.spec().ranks());
-  return commit(record, draft, request, "import " + std::to_string(head.bytes()) + " " + std::to_string(crc)).job();
+  planner_.plan(case_text(request.case_()), request.spec().ranks());
+  return commit(record, request, "import " + std::to_string(head.bytes()) + " " + std::to_string(crc), &draft).job();
 }
 
 }  // namespace bedflow::server

@@ -86,7 +86,9 @@ class Jobs {
 
   std::optional<v1::CreateJobResponse> earlier_answer(const v1::CreateJobRequest& request, const std::string& content) const;
   void start_from(v1::CreateJobRequest& request, JobRecord& record) const;
-  v1::CreateJobResponse commit(JobRecord& record, const v1::CreateJobRequest& request, const std::string& content);
+  // imported: a draft's folder with a checkpoint; the record then has its id and state already.
+  v1::CreateJobResponse commit(JobRecord& record, const v1::CreateJobRequest& request, const std::string& content,
+                               const JobFolder* imported = nullptr);
   v1::Case case_of(const JobRecord& record) const;
   void lay_out(const JobRecord& record) const;
 

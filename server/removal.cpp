@@ -33,12 +33,14 @@ std::uint64_t Jobs::remove(const std::string& id) {
       throw Refusal(Refused::wrong_state, "job " + id + " is " + state_word(state) + " and cannot be deleted before it has ended",
                     "bedflow cancel " + id);
     }
-    fs::create_directories(removed.parent_path());
-    fs::rename(folder_of(id).root(), removed);
-    sync_folder(removed.parent_path());
-    sync_folder(folder_of(id).root().parent_path());
+    if (fs::exists(folder_of(id).root())) {  // one that was cancelled before it began has none
+      fs::create_directories(removed.parent_path());
+      fs::rename(folder_of(id).root(), removed);
+      sync_folder(removed.parent_path());
+      sync_folder(folder_of(id).root().parent_path());
+    }
     catalogue_.erase(id);
-    changes_.erase(id);
+    feeds_.erase(id);
   }
   const std::uint64_t freed = bytes_freed(removed);
   fs::remove_all(removed);

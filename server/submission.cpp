@@ -4,6 +4,7 @@
 #include <sstream>
 
 #include "case_file.h"
+#include "refusal.h"
 #include "security.h"
 
 namespace bedflow::server {
