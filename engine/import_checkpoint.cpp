@@ -1,9 +1,9 @@
 #include "import_checkpoint.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <fstream>
-#include <set>
 #include <string>
 #include <unordered_set>
 
@@ -26,8 +26,21 @@ namespace fs = std::filesystem;
 
 // ------------------------------------------------------------------------------------------------------ the arrays
 
+// Words for people, as far as they are text: nothing but UTF-8 without control characters.
+std::string words_of(const std::string& text) {
+  std::size_t following = 0;  // bytes of the present character still to come
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    const bool continues = (byte & 0xC0) == 0x80;
+    if (byte < 0x20 || byte == 0x7F || byte >= 0xF5 || continues != (following > 0)) return {};
+    following = continues ? following - 1 : byte >= 0xF0 ? 3 : byte >= 0xE0 ? 2 : byte >= 0xC2 ? 1 : 0;
+    if (!continues && byte >= 0x80 && byte < 0xC2) return {};
+  }
+  return following == 0 ? text : std::string();
+}
+
 CheckpointArray array_of(const CheckpointReader& from, const Dataset& dataset) {
-  CheckpointArray array{dataset.name, dataset.unit, dataset.meaning, {}, {}, 1};
+  CheckpointArray array{dataset.name, words_of(dataset.unit), words_of(dataset.meaning), {}, {}, 1};
   if (dataset.type == Dataset::Type::byte) {
     array.values = from.text(dataset.name);
   } else if (dataset.shape.size() == 3) {
@@ -67,8 +80,14 @@ CheckpointContent content_of(const CheckpointReader& from) {
   if (!(content.time >= 0 && content.time < 1e18)) refuse("its time is " + std::to_string(content.time) + " s");
   content.numbers = from.numbers();
   content.numbers.erase("time");
-  for (const auto& [name, value] : content.numbers)
+  for (const auto& [name, value] : content.numbers) {
+    const auto is_of_a_name = [](char c) {
+      return std::islower(static_cast<unsigned char>(c)) || std::isdigit(static_cast<unsigned char>(c)) || c == '/' || c == '_';
+    };
+    if (name.size() > 100 || !std::all_of(name.begin(), name.end(), is_of_a_name))
+      refuse("one of its numbers has a name that none has");
     if (!std::isfinite(value)) refuse("its number " + name + " is not finite");
+  }
   for (const Dataset& dataset : from.datasets()) {
     const std::string of = "rank_offsets/";
     if (!dataset.name.starts_with(of)) {
@@ -164,6 +183,7 @@ class Fit {
     same("particles/diameter", scene_.particles->largest());
     same("particles/types", static_cast<double>(scene_.particles->types.size()));
     same("particles/count", static_cast<double>(particles_));
+    same("inlets/count", static_cast<double>(scene_.particles->inlets.size()));
     for (const char* name : {"position", "velocity", "position_at_rebuild"})
       one_each<double>("particles/" + std::string(name), 3);
     for (const char* name : {"particles/spin", "particles/gas_debt", "particles/contact_force", "particles/contact_torque"})

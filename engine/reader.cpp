@@ -13,6 +13,7 @@
 #include <cstring>
 #include <exception>
 #include <new>
+#include <string_view>
 
 #include "base/stop.h"
 #include "checkpoint/checkpoint.h"
@@ -112,6 +113,9 @@ int main(int argc, char** argv) {
   } catch (const bedflow::FieldRefusal& refusal) {
     return tell(refusal.what(), wrong_question);
   } catch (const bedflow::Stop& stop) {
+    // HDF5 opens nothing but what is asked for: where it fails, the file is not what its seal says.
+    const bool by_hdf5 = stop.reason == Reason::internal && std::string_view(stop.what()).starts_with("HDF5: ");
+    if (by_hdf5) return tell(stop.what(), static_cast<int>(Reason::checkpoint_corrupt));
     return tell(stop.what(), static_cast<int>(stop.reason));
   } catch (const std::bad_alloc&) {
     return tell("more than " + std::to_string(arguments.memory_mib) + " MiB of memory are needed",

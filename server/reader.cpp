@@ -24,6 +24,16 @@ std::string first_lines(const std::string& text) {
   return line;
 }
 
+// The reader names the file by its whole path, which is nobody's business.
+std::string without_path(std::string text, const std::filesystem::path& file) {
+  for (const auto& [path, shown] :
+       {std::pair(file.string() + ": ", std::string()), std::pair(file.string(), std::string("the file"))}) {
+    for (auto place = text.find(path); place != std::string::npos; place = text.find(path))
+      text.replace(place, path.size(), shown);
+  }
+  return text;
+}
+
 std::vector<v1::Fault> faults_of(const std::string& lines) {
   std::vector<v1::Fault> faults;
   std::istringstream text(lines);
@@ -55,8 +65,8 @@ std::shared_ptr<void> Readers::take_place() {
   return {this, [](Readers* readers) { readers->places_.release(); }};
 }
 
-void Readers::refuse(const Answer& answer) const {
-  const std::string said = first_lines(answer.error);
+void Readers::refuse(const Answer& answer, const std::filesystem::path& file) const {
+  const std::string said = without_path(first_lines(answer.error), file);
   const bool too_long = answer.timed_out || answer.exit_code == 128 + SIGALRM || answer.exit_code == 128 + SIGXCPU;
   if (too_long) {
     throw Refusal(Refused::too_much, "reading the checkpoint took more than the " + std::to_string(settings_.time.count()) +
@@ -84,43 +94,48 @@ void Readers::refuse(const Answer& answer) const {
                 "bedflow-reader gave no answer: " + (said.empty() ? "exit code " + std::to_string(answer.exit_code) : said));
 }
 
-std::string Readers::answer(std::vector<std::string> command) {
+std::string Readers::answer(const char* question, const std::filesystem::path& file, const std::string& more) {
   const auto place = take_place();
-  Answer answer = server::ask(command, settings_.time + std::chrono::seconds(1), longest_report);
-  if (answer.exit_code != 0) refuse(answer);
+  auto words = command(question, file);
+  if (!more.empty()) words.push_back(more);
+  Answer answer = server::ask(words, settings_.time + std::chrono::seconds(1), longest_report);
+  if (answer.exit_code != 0) refuse(answer, file);
   return std::move(answer.output);
 }
 
 v1::CheckpointReport Readers::describe(const std::filesystem::path& file) {
   v1::CheckpointReport report;
-  if (!report.ParseFromString(answer(command("describe", file))))
+  if (!report.ParseFromString(answer("describe", file)))
     throw Refusal(Refused::backend_error, "bedflow-reader's report cannot be read");
   return report;
 }
 
 std::vector<v1::Fault> Readers::verify(const std::filesystem::path& file) {
-  return faults_of(answer(command("verify", file)));
+  return faults_of(answer("verify", file));
 }
 
 v1::CheckpointReport Readers::import(const std::filesystem::path& file, const std::filesystem::path& folder) {
-  auto words = command("import", file);
-  words.push_back(folder);
   v1::CheckpointReport report;
-  if (!report.ParseFromString(answer(words))) throw Refusal(Refused::backend_error, "bedflow-reader's report cannot be read");
+  if (!report.ParseFromString(answer("import", file, folder)))
+    throw Refusal(Refused::backend_error, "bedflow-reader's report cannot be read");
   return report;
 }
 
 // ---------------------------------------------------------------------------------------------------------- fields
 
-Readers::Answering::Answering(Readers& all, const std::vector<std::string>& command)
-    : all_(all), place_(all.take_place()), child_(command), deadline_(std::chrono::steady_clock::now() + all.settings_.time) {}
+Readers::Answering::Answering(Readers& all, const std::filesystem::path& file, const std::vector<std::string>& command)
+    : all_(all),
+      file_(file),
+      place_(all.take_place()),
+      child_(command),
+      deadline_(std::chrono::steady_clock::now() + all.settings_.time) {}
 
 std::optional<v1::FieldAnswer> Readers::Answering::next() {
   const std::string head = child_.read(4, deadline_);
   if (head.size() < 4) {
     const Answer answer = child_.end(deadline_);
     place_.reset();
-    if (answer.exit_code != 0 || !head.empty()) all_.refuse(answer);
+    if (answer.exit_code != 0 || !head.empty()) all_.refuse(answer, file_);
     return std::nullopt;
   }
   std::uint32_t length = 0;
@@ -130,7 +145,7 @@ std::optional<v1::FieldAnswer> Readers::Answering::next() {
     throw Refusal(Refused::too_much, "the answer is longer than 1 GiB; ask for a smaller region or fewer quantities");
   const std::string bytes = child_.read(length, deadline_);
   v1::FieldAnswer part;
-  if (bytes.size() < length) all_.refuse(child_.end(deadline_));
+  if (bytes.size() < length) all_.refuse(child_.end(deadline_), file_);
   if (!part.ParseFromString(bytes)) throw Refusal(Refused::reader_failed, "the reader's answer cannot be understood");
   return part;
 }
@@ -138,7 +153,7 @@ std::optional<v1::FieldAnswer> Readers::Answering::next() {
 std::unique_ptr<Readers::Answering> Readers::ask(const std::filesystem::path& file, const v1::FieldQuery& query) {
   auto words = command("field", file);
   words.push_back(query.ShortDebugString());
-  return std::unique_ptr<Answering>(new Answering(*this, words));
+  return std::unique_ptr<Answering>(new Answering(*this, file, words));
 }
 
 // ----------------------------------------------------------------------------------------------------- which file
@@ -166,9 +181,7 @@ void with_checkpoint(const JobFolder& folder, const v1::CheckpointName& name,
         const bool gone = !std::filesystem::exists(file);
         if (refusal.why != Refused::checkpoint_corrupt && !gone) throw;
         vanished = vanished || gone;
-        std::string fault = refusal.what();  // the reader names the file by its whole path
-        if (const auto path = fault.find(file.string()); path != std::string::npos) fault.erase(path, file.string().size() + 2);
-        faults += (faults.empty() ? "" : "; ") + JobFolder::checkpoint_name(step) + ": " + fault;
+        faults += (faults.empty() ? "" : "; ") + JobFolder::checkpoint_name(step) + ": " + refusal.what();
       }
     }
     if (!vanished) break;

@@ -41,8 +41,9 @@ class Readers {
 
    private:
     friend class Readers;
-    Answering(Readers& all, const std::vector<std::string>& command);
+    Answering(Readers& all, const std::filesystem::path& file, const std::vector<std::string>& command);
     Readers& all_;
+    const std::filesystem::path file_;
     std::shared_ptr<void> place_;
     Child child_;
     const Child::Deadline deadline_;
@@ -52,8 +53,8 @@ class Readers {
 
  private:
   std::vector<std::string> command(const char* question, const std::filesystem::path& file) const;
-  std::string answer(std::vector<std::string> command);
-  [[noreturn]] void refuse(const Answer& answer) const;
+  std::string answer(const char* question, const std::filesystem::path& file, const std::string& more = {});
+  [[noreturn]] void refuse(const Answer& answer, const std::filesystem::path& file) const;
   std::shared_ptr<void> take_place();  // throws Refusal(too_much)
 
   const ReaderSettings settings_;

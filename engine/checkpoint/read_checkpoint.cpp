@@ -155,7 +155,7 @@ std::vector<Value> CheckpointReader::File::read_rows(const std::string& array, h
     const auto rank = static_cast<hsize_t>(comm.rank()), size = static_cast<hsize_t>(comm.size()), rows = count[0];
     std::array<std::int64_t, 2> bounds = {static_cast<std::int64_t>(rows * rank / size),
                                           static_cast<std::int64_t>(rows * (rank + 1) / size)};
-    if (comm.size() == ranks) {
+    if (comm.size() == ranks && ranks > 1) {
       const hsize_t two = 2;
       verify("rank_offsets/" + array);
       read_slab(open("rank_offsets/" + array), H5T_NATIVE_INT64, std::span(&rank, 1), std::span(&two, 1), bounds.data());

@@ -18,11 +18,15 @@ def setUpModule():
 
 
 class Checkpoints(unittest.TestCase):
-    def setUp(self):
-        self.connection = self.enterContext(server.connect())
-        self.job = self.connection.submit(CROWD).wait(60)
-        self.step = self.job.checkpoints()[0].step
-        self.bytes = server.checkpoint(self.job, self.step).read_bytes()
+    @classmethod
+    def setUpClass(cls):
+        cls.connection = cls.enterClassContext(server.connect())
+        cls.job = cls.connection.submit(CROWD).wait(60)
+        cls.step = cls.job.checkpoints()[0].step
+        cls.bytes = server.checkpoint(cls.job, cls.step).read_bytes()
+
+    def tearDown(self):
+        server.checkpoint(self.job, self.step).write_bytes(self.bytes)
 
     def flip(self, name):
         path = server.checkpoint(self.job, self.step)
