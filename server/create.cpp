@@ -5,6 +5,7 @@
 #include <google/protobuf/io/zero_copy_stream_impl_lite.h>
 #include <spdlog/spdlog.h>
 
+#include <fstream>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -38,7 +39,7 @@ std::string content_of(v1::CreateJobRequest request) {
 void write_folder(const JobFolder& folder, const std::string& text, const v1::JobSpec& spec) {
   write_durably(folder.case_file(), text);
   write_durably(folder.spec(), spec);
-  write_durably(folder.events(), std::string_view());  // empty: it can be watched from the start
+  std::ofstream(folder.events()).close();  // empty: its growth can be watched from the start
 }
 
 void move_into_place(const JobFolder& draft, const JobFolder& folder) {
@@ -150,17 +151,18 @@ v1::CreateJobResponse Jobs::commit(JobRecord& record, const v1::CreateJobRequest
   return response;
 }
 
-void Jobs::lay_out(const JobRecord& record) const {
-  const auto folder = folder_of(record.job.id());
-  if (!fs::exists(folder.case_file())) {
-    const DraftFolder draft(settings_.data / "drafts" / record.job.id());
-    write_folder(draft.folder, case_text(case_of(record)), record.job.spec());
+// text: of the case, where there is no folder yet. Needs no lock.
+void Jobs::lay_out(const std::string& id, const std::string& text, const v1::JobSpec& spec) const {
+  const auto folder = folder_of(id);
+  if (!text.empty()) {
+    const DraftFolder draft(settings_.data / "drafts" / id);
+    write_folder(draft.folder, text, spec);
     move_into_place(draft.folder, folder);
     return;
   }
-  v1::JobSpec spec;
-  const bool is_same = read_message(folder.spec(), spec) && spec.SerializeAsString() == record.job.spec().SerializeAsString();
-  if (!is_same) write_durably(folder.spec(), record.job.spec());  // resumed on other ranks
+  v1::JobSpec written;
+  const bool is_same = read_message(folder.spec(), written) && written.SerializeAsString() == spec.SerializeAsString();
+  if (!is_same) write_durably(folder.spec(), spec);  // resumed on other ranks
 }
 
 }  // namespace bedflow::server

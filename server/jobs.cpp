@@ -157,8 +157,9 @@ v1::Job Jobs::request(const std::string& id, Request request, const char* wanted
   const auto next = after_request(record.job.state(), request);
   if (next == record.job.state()) return view(record);
   if (live != live_.end()) {
-    live->second.attempt.folder().command(command, skip_checkpoint);
-    live->second.repeat_command = !live->second.attempt.has_started();
+    live->second.skip_checkpoint = skip_checkpoint;
+    const JobFolder& folder = live->second.attempt.folder();
+    if (fs::exists(folder.root())) folder.command(command, skip_checkpoint);
   }
   store(record, next);
   return view(record);

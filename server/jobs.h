@@ -69,8 +69,9 @@ class Jobs {
   struct Live {  // a job with an attempt
     JobRecord record;
     Attempt attempt;
-    bool adopted = false;         // found, not started by this server
-    bool repeat_command = false;  // a command came before the engine did
+    bool adopted = false;          // found, not started by this server
+    bool repeat_command = false;   // if one comes before the engine does
+    bool skip_checkpoint = false;  // as the last command says
     bool heartbeat_lost = false;
     std::optional<Ending> start_failure = {};                              // its runner could not be started
     std::optional<std::chrono::steady_clock::time_point> stopped_at = {};  // when the engine said so
@@ -90,15 +91,15 @@ class Jobs {
   v1::CreateJobResponse commit(JobRecord& record, const v1::CreateJobRequest& request, const std::string& content,
                                const JobFolder* imported = nullptr);
   v1::Case case_of(const JobRecord& record) const;
-  void lay_out(const JobRecord& record) const;
+  void lay_out(const std::string& id, const std::string& text, const v1::JobSpec& spec) const;
 
   void finish_removals();
   void adopt();
   void look_at(Live& live);
   void end(Live& live);
   void store_end(JobRecord& record, Ending ending, bool is_nobodys_fault);
-  void start_waiting();
-  void start(JobRecord record);
+  std::optional<JobRecord> next_to_start();
+  void start(JobRecord record, std::unique_lock<std::mutex>& guard);
 
   Settings settings_;
   Planner planner_;

@@ -74,6 +74,7 @@ grpc::Status status_of(const Refusal& refusal) {
   v1::ErrorDetail detail;
   detail.set_reason(code.reason);
   if (!refusal.next.empty()) detail.set_next(refusal.next);
+  if (refusal.why == Refused::going_down) detail.set_retry_after_seconds(1);
   std::size_t sent = 0;
   for (; sent < refusal.faults.size() && detail.ByteSizeLong() + refusal.faults[sent].ByteSizeLong() < most_bytes; ++sent) {
     *detail.add_faults() = refusal.faults[sent];

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "case_file.h"
 #include "jobs.h"
 
 namespace bedflow::server {
@@ -59,6 +60,7 @@ void Jobs::adopt() {
     live.adopted = true;
     notifier_.add(live.attempt.folder().events());
     live.attempt.look();
+    live.repeat_command = !live.attempt.has_started();
     const bool alive = executor_.is_alive(live.attempt.folder(), epoch);
     spdlog::info("{} taken up in state {}; attempt {} {}", id, state_word(live.record.job.state()), epoch,
                  alive ? "runs" : "has ended");
@@ -72,7 +74,7 @@ std::set<std::string> Jobs::advance() {
     for (const auto& [id, live] : live_) ending = ending || live.stopped_at;
   }
   notifier_.wait(ending ? end_patience : patience);
-  const std::lock_guard guard(mutex_);
+  std::unique_lock guard(mutex_);
   executor_.reap();
   for (auto entry = live_.begin(); entry != live_.end();) {
     Live& live = entry->second;
@@ -81,7 +83,7 @@ std::set<std::string> Jobs::advance() {
     if (!alive) end(live);
     entry = is_attended(live.record.job.state()) ? std::next(entry) : live_.erase(entry);
   }
-  start_waiting();
+  while (auto next = next_to_start()) start(std::move(*next), guard);
   changed_.notify_all();
   return std::exchange(news_, {});
 }
@@ -95,7 +97,8 @@ void Jobs::look_at(Live& live) {
   if (attempt.has_started() && std::exchange(live.repeat_command, false)) {
     v1::Control last;
     read_message(attempt.folder().control(), last);
-    attempt.folder().command(last.command(), last.skip_checkpoint());
+    if (state == v1::SUSPENDING) attempt.folder().command(v1::Control::SUSPEND);
+    if (state == v1::CANCELLING) attempt.folder().command(v1::Control::CANCEL, live.skip_checkpoint || last.skip_checkpoint());
   }
   if (attempt.stopped() && !live.stopped_at) live.stopped_at = Clock::now();
   if (live.stopped_at && Clock::now() - *live.stopped_at > longest_end) executor_.kill(attempt.folder(), attempt.epoch());
@@ -133,32 +136,41 @@ void Jobs::store_end(JobRecord& record, Ending ending, bool is_nobodys_fault) {
   store(record, next, ending);
 }
 
-void Jobs::start_waiting() {
+// The oldest waiting job that is due, if its ranks fit into the free slots.
+std::optional<JobRecord> Jobs::next_to_start() {
   std::uint32_t used = 0;
   for (const auto& [id, live] : live_) used += live.record.job.spec().ranks();
   for (auto& record : catalogue_.in_states({v1::PENDING, v1::RECOVERING}, queue_look)) {
     if (!is_due(record.job)) continue;
-    used += record.job.spec().ranks();
-    if (used > settings_.slots) return;
-    start(std::move(record));
+    if (used + record.job.spec().ranks() > settings_.slots) return std::nullopt;
+    return std::move(record);
   }
+  return std::nullopt;
 }
 
-void Jobs::start(JobRecord record) {
+// Calls go on while the folder is written and the runner started; that takes many writes to the disk.
+void Jobs::start(JobRecord record, std::unique_lock<std::mutex>& guard) {
   const std::string id = record.job.id();
   const auto folder = folder_of(id);
   const auto epoch = record.job.epoch() + 1;
   record.job.set_epoch(epoch);
   // Committed before it happens: whatever dies now, no other attempt has this epoch.
   store(record, v1::STARTING);
-  auto& live = live_.emplace(id, Live{std::move(record), Attempt(folder, epoch)}).first->second;
+  auto& live = live_.emplace(id, Live{std::move(record), Attempt(folder, epoch)}).first->second;  // only this thread erases it
   live.attempt.look();
+  live.repeat_command = true;
   try {
-    lay_out(live.record);
-    folder.command(v1::Control::NONE);  // commands to the attempt before are over
-    executor_.start(folder, epoch, live.record.job.spec().ranks(), live.record.from_step);
+    std::filesystem::remove(folder.control());  // commands to the attempt before are over
+    const std::string text = std::filesystem::exists(folder.case_file()) ? "" : case_text(case_of(live.record));
+    const v1::JobSpec spec = live.record.job.spec();
+    const auto from_step = live.record.from_step;
+    guard.unlock();
+    lay_out(id, text, spec);
+    executor_.start(folder, epoch, spec.ranks(), from_step);
+    guard.lock();
     notifier_.add(folder.events());
   } catch (const std::exception& failure) {
+    if (!guard.owns_lock()) guard.lock();
     spdlog::error("{} cannot be started: {}", id, failure.what());
     const auto* system = dynamic_cast<const std::system_error*>(&failure);
     const bool is_full = system && system->code() == std::errc::no_space_on_device;

@@ -51,9 +51,10 @@ class Watcher : public grpc::ServerWriteReactor<v1::WatchJobResponse> {
   std::optional<grpc::Status> next_or_end() {
     if (gone_) return grpc::Status::CANCELLED;
     if (all_.draining_) {
-      return grpc::Status(
-          grpc::StatusCode::UNAVAILABLE,
-          "the server is going down, the job is not; reconnect with after_sequence " + std::to_string(cursor_.sequence()));
+      return status_of(
+          {Refused::going_down,
+           "the server is going down, the job is not; reconnect with after_sequence " + std::to_string(cursor_.sequence()),
+           "bedflow watch " + id_});
     }
     try {
       auto response = cursor_.next();

@@ -1,13 +1,16 @@
 // An engine by contract, without physics: for tests of the server that take milliseconds. What goes wrong, and when, is said in
 // the case's description, e.g. "step_ms=2 die_at=40 epoch=1":
 //   step_ms=N     wall time of a step            die_at=S      kill -9 itself at step S
+//   die_after=N   kill -9 itself after N steps
 //   diverge_at=S  stop with DIVERGED             freeze_at=S   live on without heartbeat or steps
 //   epoch=N       the mishap happens in attempt N only        refuse=PATH   the plan finds a fault there
 //   plan=dies     kill -9 itself over the plan
+// It tells by itself when another one runs in the same folder: "doubled" is there then.
 // A checkpoint's content is "good <step>"; anything else is corrupt.
 #include <fcntl.h>
 #include <google/protobuf/text_format.h>
 #include <signal.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -68,8 +71,10 @@ class Engine {
         from_(from) {}
 
   int run() {
+    if (!is_alone()) std::ofstream(folder_ / "doubled", std::ios::app) << "attempt " << epoch_ << "\n";
     const auto steps = static_cast<std::uint64_t>(std::lround(scene_.time().end() / dt()));
     if (!take_up()) return stop(v1::CHECKPOINT_CORRUPT, "no good checkpoint");
+    started_at_ = step_;
     begin(static_cast<double>(steps) * dt());
     while (step_ < steps) {
       std::this_thread::sleep_for(std::chrono::milliseconds(std::stoi(option(scene_, "step_ms", "1"))));
@@ -85,6 +90,11 @@ class Engine {
   }
 
  private:
+  // Until this process ends.
+  bool is_alone() const {
+    const int lock = ::open((folder_ / "engine.lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+    return ::flock(lock, LOCK_EX | LOCK_NB) == 0;
+  }
   double dt() const { return scene_.time().step() > 0 ? scene_.time().step() : 0.01; }
   double time() const { return static_cast<double>(step_) * dt(); }
   fs::path checkpoint(std::uint64_t step) const {
@@ -168,6 +178,7 @@ class Engine {
     if (in_epoch != 0 && in_epoch != epoch_) return std::nullopt;
     const auto due = [&](const char* name) { return option(scene_, name, "") == std::to_string(step_); };
     if (due("die_at")) ::kill(::getpid(), SIGKILL);
+    if (option(scene_, "die_after", "") == std::to_string(step_ - started_at_)) ::kill(::getpid(), SIGKILL);
     while (due("freeze_at")) std::this_thread::sleep_for(std::chrono::seconds(1));
     return due("diverge_at") ? std::optional(v1::DIVERGED) : std::nullopt;
   }
@@ -199,7 +210,7 @@ class Engine {
   bedflow::LogWriter events_;
   bedflow::LogWriter statistics_;
   std::optional<std::uint64_t> from_;
-  std::uint64_t step_ = 0;
+  std::uint64_t step_ = 0, started_at_ = 0;
   std::uint64_t obeyed_ = 0;
 };
 

@@ -190,11 +190,7 @@ TEST_F(MissingEngine, IsABackendErrorOfTheCall) {
   ServerProcess server(server_program, folder.path() / "data", "/nonexistent/bedflow-engine");
   grpc::ClientContext context;
   v1::CreateJobResponse response;
-  struct Cases : ServiceTest {
-    using ServiceTest::job_of;
-    void TestBody() override {}
-  };
-  const auto status = server.stub().CreateJob(&context, Cases::job_of(1), &response);
+  const auto status = server.stub().CreateJob(&context, job_of(1), &response);
   EXPECT_EQ(status.error_code(), grpc::StatusCode::INTERNAL);
   EXPECT_THAT(status.error_message(), testing::HasSubstr("/nonexistent/bedflow-engine"));
 }

@@ -14,31 +14,31 @@ namespace bedflow::test {
 
 inline const std::string server_program = BEDFLOW_BIN_DIR "/bedflowd";
 
+// A good case of so many steps for the fake engine; `asks` as in fake_engine.cpp.
+inline v1::CreateJobRequest job_of(int steps, const std::string& asks = "") {
+  v1::CreateJobRequest request;
+  auto& scene = *request.mutable_case_();
+  scene.set_name("fake");
+  scene.set_description(asks);
+  auto& size = *scene.mutable_domain()->mutable_size();
+  size.set_x(0.1), size.set_y(0.1), size.set_z(0.1);
+  auto& cells = *scene.mutable_domain()->mutable_cells();
+  cells.set_x(4), cells.set_y(4), cells.set_z(4);
+  scene.mutable_gravity()->set_y(-9.81);
+  scene.mutable_gas()->set_density(1.2);
+  scene.mutable_gas()->set_viscosity(1.8e-5);
+  scene.mutable_gas()->mutable_simple();
+  scene.mutable_gas()->mutable_upwind();
+  scene.mutable_time()->set_step(0.01);
+  scene.mutable_time()->set_end(0.01 * steps);
+  request.mutable_spec()->mutable_checkpoints()->set_every_steps(10);
+  return request;
+}
+
 class ServiceTest : public testing::Test {
  protected:
   explicit ServiceTest(std::vector<std::string> arguments = {})
       : server_(server_program, folder_.path() / "data", BEDFLOW_FAKE_ENGINE, std::move(arguments)) {}
-
-  // A good case of so many steps for the fake engine; `asks` as in fake_engine.cpp.
-  static v1::CreateJobRequest job_of(int steps, const std::string& asks = "") {
-    v1::CreateJobRequest request;
-    auto& scene = *request.mutable_case_();
-    scene.set_name("fake");
-    scene.set_description(asks);
-    auto& size = *scene.mutable_domain()->mutable_size();
-    size.set_x(0.1), size.set_y(0.1), size.set_z(0.1);
-    auto& cells = *scene.mutable_domain()->mutable_cells();
-    cells.set_x(4), cells.set_y(4), cells.set_z(4);
-    scene.mutable_gravity()->set_y(-9.81);
-    scene.mutable_gas()->set_density(1.2);
-    scene.mutable_gas()->set_viscosity(1.8e-5);
-    scene.mutable_gas()->mutable_simple();
-    scene.mutable_gas()->mutable_upwind();
-    scene.mutable_time()->set_step(0.01);
-    scene.mutable_time()->set_end(0.01 * steps);
-    request.mutable_spec()->mutable_checkpoints()->set_every_steps(10);
-    return request;
-  }
 
   grpc::Status create(const v1::CreateJobRequest& request, v1::CreateJobResponse& response) {
     grpc::ClientContext context;

@@ -4,90 +4,13 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <span>
 
-#include "folder.h"
-#include "service_fixture.h"
+#include "real_engine_fixture.h"
+#include "support/trials.h"
 
 namespace bedflow::test {
 namespace {
-
-// A box of falling and colliding particles in gas: some seconds of wall time, all parts of the engine at work.
-v1::CreateJobRequest bed(std::uint32_t ranks, double end) {
-  v1::CreateJobRequest request;
-  auto& scene = *request.mutable_case_();
-  scene.set_name("small-bed");
-  auto& size = *scene.mutable_domain()->mutable_size();
-  size.set_x(0.024), size.set_y(0.048), size.set_z(0.01);
-  auto& cells = *scene.mutable_domain()->mutable_cells();
-  cells.set_x(8), cells.set_y(16), cells.set_z(4);
-  scene.mutable_domain()->mutable_faces()->mutable_y_low()->mutable_inflow()->set_velocity(0.5);
-  scene.mutable_domain()->mutable_faces()->mutable_y_high()->mutable_outflow();
-  scene.mutable_gravity()->set_y(-9.81);
-  auto& gas = *scene.mutable_gas();
-  gas.set_density(1.2);
-  gas.set_viscosity(1.8e-5);
-  gas.mutable_simple();
-  gas.mutable_upwind();
-  auto& particles = *scene.mutable_particles();
-  particles.set_diameter(1.2e-3);
-  particles.set_density(1000);
-  particles.mutable_linear_spring_dashpot()->set_stiffness(440);
-  particles.mutable_linear_spring_dashpot()->set_restitution(0.9);
-  particles.mutable_spring()->set_friction(0.1);
-  particles.mutable_random()->set_count(500);
-  particles.mutable_random()->set_seed(1);
-  auto& region = *particles.mutable_random()->mutable_region();
-  region.mutable_low();
-  region.mutable_high()->set_x(0.024);
-  region.mutable_high()->set_y(0.02);
-  region.mutable_high()->set_z(0.01);
-  particles.mutable_symplectic_euler();
-  auto& coupling = *scene.mutable_coupling();
-  coupling.mutable_gidaspow_blended();
-  coupling.mutable_hat();
-  coupling.mutable_explicit_();
-  scene.mutable_time()->set_end(end);
-  auto& energy = *scene.add_monitors();
-  energy.set_name("kinetic_energy");
-  energy.mutable_kinetic_energy();
-  energy.set_interval(0.0005);
-  request.mutable_spec()->set_ranks(ranks);
-  request.mutable_spec()->mutable_checkpoints()->set_every_simulated_seconds(0.005);
-  request.mutable_spec()->mutable_checkpoints()->set_keep(3);
-  return request;
-}
-
-class RealEngine : public testing::Test {
- protected:
-  std::string submit(const v1::CreateJobRequest& request) {
-    grpc::ClientContext context;
-    v1::CreateJobResponse response;
-    const auto status = stub().CreateJob(&context, request, &response);
-    EXPECT_TRUE(status.ok()) << status.error_message() << "\n" << detail_of(status).DebugString();
-    return response.job().id();
-  }
-  // Until the job's first checkpoint is reported.
-  std::vector<v1::WatchJobResponse> watch_to_checkpoint(const std::string& id) {
-    return watch(
-        stub(), id, 0, [](const auto& response) { return response.event().has_checkpoint(); }, limit);
-  }
-  v1::Job wait_for(const std::string& id, v1::JobState state) { return wait_for_state(stub(), id, state, limit); }
-  v1::Statistics statistics(const std::string& id) {
-    grpc::ClientContext context;
-    v1::QueryStatisticsRequest request;
-    request.set_id(id);
-    v1::Statistics answer;
-    const auto status = stub().QueryStatistics(&context, request, &answer);
-    EXPECT_TRUE(status.ok()) << status.error_message();
-    return answer;
-  }
-  std::string logs(const std::string& id) { return server::last_lines(server::JobFolder(server_.folder(id)).error_log(1), 4000); }
-  v1::JobService::Stub& stub() { return server_.stub(); }
-
-  const std::chrono::seconds limit{120};
-  TemporaryFolder folder_;
-  ServerProcess server_{BEDFLOW_BIN_DIR "/bedflowd", folder_.path() / "data", BEDFLOW_BIN_DIR "/bedflow-engine"};
-};
 
 TEST_F(RealEngine, RunsAJobOnTwoRanksToItsEnd) {
   const auto id = submit(bed(2, 0.01));
@@ -204,6 +127,60 @@ TEST_F(RealEngine, PassesOverABitFlippedCheckpoint) {
   grpc::ClientContext context;
   request.set_step(steps[0]);
   EXPECT_EQ(stub().GetSnapshot(&context, request, &snapshot).error_code(), grpc::StatusCode::DATA_LOSS);
+}
+
+class RealFaults : public RealEngine {
+ protected:
+  RealFaults() : RealEngine({"--heartbeat-seconds", "5"}) {}
+
+  std::vector<pid_t> ranks(const std::string& id) {
+    auto found = server_.engines(id);
+    std::sort(found.begin(), found.end());  // rank 0 was started first
+    return found;
+  }
+  pid_t mpirun(const std::string& id) {
+    for (const pid_t process : server_.attempt_processes(id)) {
+      if (server::command_line(process).starts_with("mpirun")) return process;
+    }
+    return 0;
+  }
+};
+
+// One job, and each time it has come to a new checkpoint another fault.
+TEST_F(RealFaults, AJobThatMeetsThemAllEndsWithTheBitsOfOneThatMetNone) {
+  const auto undisturbed = submit(bed(2, 0.03));
+  ASSERT_EQ(wait_for(undisturbed, v1::SUCCEEDED).state(), v1::SUCCEEDED) << logs(undisturbed);
+  const auto id = submit(bed(2, 0.03));
+  struct Fault {
+    const char* what;
+    int signal;
+    v1::StopReason found;
+  };
+  std::uint64_t last = 0, step = 0;
+  std::uint32_t epoch = 0;
+  const std::vector<Fault> faults = {{"mpirun", SIGKILL, v1::RANK_DIED},
+                                     {"rank 1", SIGSTOP, v1::HEARTBEAT_LOST},
+                                     {"rank 1", SIGKILL, v1::RANK_DIED},
+                                     {"rank 0", SIGSTOP, v1::HEARTBEAT_LOST}};
+  for (const auto& [what, signal, found] : std::span(faults).first(static_cast<std::size_t>(trials(2, 4)))) {
+    ++epoch;
+    const auto to_checkpoint = watch(
+        stub(), id, last, [&](const auto& one) { return one.event().epoch() == epoch && one.event().checkpoint().step() > step; },
+        limit);
+    ASSERT_TRUE(to_checkpoint.back().event().has_checkpoint()) << what << "\n" << logs(id);
+    last = to_checkpoint.back().sequence();
+    step = to_checkpoint.back().event().checkpoint().step();
+    const auto of = ranks(id);
+    ASSERT_EQ(of.size(), 2u);
+    ::kill(what == std::string("mpirun") ? mpirun(id) : of[what == std::string("rank 1")], signal);
+    const auto recovering = wait_for(id, v1::RECOVERING);
+    EXPECT_EQ(recovering.state(), v1::RECOVERING) << what;
+    EXPECT_EQ(recovering.reason(), found) << what << ": " << recovering.message();
+  }
+  const auto done = wait_for(id, v1::SUCCEEDED);
+  EXPECT_EQ(done.state(), v1::SUCCEEDED) << done.message() << logs(id);
+  EXPECT_EQ(done.epoch(), epoch + 1);
+  EXPECT_EQ(statistics(id).series(0).SerializeAsString(), statistics(undisturbed).series(0).SerializeAsString());
 }
 
 }  // namespace

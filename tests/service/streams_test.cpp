@@ -143,6 +143,8 @@ TEST_F(Streams, AServerThatGoesDownEndsItsStreamsWithTheToken) {
   const auto status = ended.get();
   EXPECT_EQ(status.error_code(), StatusCode::UNAVAILABLE);
   EXPECT_THAT(status.error_message(), testing::HasSubstr("after_sequence"));
+  EXPECT_EQ(detail_of(status).reason(), "GOING_DOWN");
+  EXPECT_GT(detail_of(status).retry_after_seconds(), 0);
 }
 
 TEST_F(Streams, AServerThatGoesDownAnswersWhoeverWaitsForACheckpoint) {
