@@ -13,6 +13,7 @@
 #include <CLI/CLI.hpp>
 #include <atomic>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <stdexcept>
 #include <string>
@@ -45,7 +46,12 @@ struct Options {
 void take_folder(const fs::path& data) {
   const int lock = ::open((data / "lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
   if (lock < 0) throw std::system_error(errno, std::generic_category(), (data / "lock").string());
-  if (::flock(lock, LOCK_EX | LOCK_NB) != 0) throw std::runtime_error("another bedflowd serves " + data.string());
+  // A server that was killed while it started a process leaves the lock to that one until it has begun: moments.
+  const auto deadline = std::chrono::steady_clock::now() + 2s;
+  while (::flock(lock, LOCK_EX | LOCK_NB) != 0) {
+    if (std::chrono::steady_clock::now() > deadline) throw std::runtime_error("another bedflowd serves " + data.string());
+    std::this_thread::sleep_for(10ms);
+  }
 }
 
 std::unique_ptr<grpc::Server> listen(const std::string& address, JobService& service, int& port) {
@@ -90,7 +96,7 @@ void wait_for_end(const sigset_t& signals, const std::function<bool()>& has_noth
   }
 }
 
-int serve(const Options& options) {
+[[noreturn]] void serve(const Options& options) {
   sigset_t signals;
   sigemptyset(&signals);
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&signals, signal);
@@ -132,7 +138,9 @@ int serve(const Options& options) {
   jobs.poke();
   supervisor.join();
   service.wait_for_calls();
-  return 0;
+  // gRPC's own end may wait 10 s for a poller of a connection that is gone. All that lasts is on the disk.
+  spdlog::shutdown();
+  std::_Exit(0);
 }
 
 fs::path own_path() {
@@ -198,7 +206,7 @@ int run(int argc, char** argv) {
   options.reader.time = std::chrono::seconds(options.reader_seconds);
   options.settings.heartbeat_limit = std::chrono::seconds(static_cast<int>(options.heartbeat_seconds));
   if (options.listen.empty()) options.listen = "unix:" + (options.settings.data / "bedflowd.sock").string();
-  return serve(options);
+  serve(options);
 }
 
 }  // namespace

@@ -61,9 +61,19 @@ Hdf5Handle create_checkpoint_hdf5(const std::filesystem::path& path, std::uint64
   return Hdf5Handle(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, creation, access), H5Fclose, "create " + path.string());
 }
 
-Hdf5Handle create_plot_hdf5(const std::filesystem::path& path) {
+Hdf5Handle create_plot_hdf5() {
   const Hdf5Handle access = file_access();
-  return Hdf5Handle(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access), H5Fclose, "create " + path.string());
+  check_hdf5(H5Pset_fapl_core(access, 1 << 20, false), "keep a file in memory");
+  return Hdf5Handle(H5Fcreate("plot", H5F_ACC_TRUNC, H5P_DEFAULT, access), H5Fclose, "create a plot file");
+}
+
+std::vector<std::byte> image_of(hid_t file) {
+  check_hdf5(H5Fflush(file, H5F_SCOPE_GLOBAL), "flush a plot file");
+  const ssize_t size = H5Fget_file_image(file, nullptr, 0);
+  std::vector<std::byte> image(static_cast<std::size_t>(std::max<ssize_t>(size, 0)));
+  if (size < 0 || H5Fget_file_image(file, image.data(), image.size()) != size)
+    throw Stop(Reason::internal, "HDF5: cannot give the bytes of a plot file");
+  return image;
 }
 
 Hdf5Handle open_hdf5(const std::filesystem::path& path) {

@@ -4,6 +4,7 @@
 
 #include <hdf5.h>
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <span>
@@ -36,8 +37,9 @@ void check_hdf5(herr_t status, const std::string& what);
 
 // Metadata of format 1.10 (with checksums), no older and no newer; a user block of so many bytes in front.
 Hdf5Handle create_checkpoint_hdf5(const std::filesystem::path& path, std::uint64_t user_block);
-// In the format that the widest range of readers knows.
-Hdf5Handle create_plot_hdf5(const std::filesystem::path& path);
+// In the format that the widest range of readers knows; in memory, as image_of() gives it.
+Hdf5Handle create_plot_hdf5();
+std::vector<std::byte> image_of(hid_t file);
 Hdf5Handle open_hdf5(const std::filesystem::path& path);
 
 // Contiguous, allocated at once, not filled; groups in the path are made. type: a native type of HDF5.

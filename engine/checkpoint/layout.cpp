@@ -126,7 +126,9 @@ Manifest Layout::create(const std::filesystem::path& path, Seal& seal) const {
   constexpr std::uint64_t metadata_a_dataset = 4096;  // far more than its header and attributes take
   check_room(path.parent_path(), total + seal.manifest_bytes + metadata_a_dataset * (datasets_.size() + 4));
 
-  Hdf5Handle file = create_checkpoint_hdf5(path, seal_bytes);
+  MemoryFile memory;  // the arrays are holes in it
+  Hdf5Handle file = create_checkpoint_hdf5(memory.path(), seal_bytes);
+  memory.unname();
   write_attribute(file, "format_version", static_cast<std::int64_t>(checkpoint_format));
   write_attribute(file, "build_version", BEDFLOW_VERSION);
   write_attribute(file, "step", static_cast<std::int64_t>(content_.step));
@@ -147,9 +149,7 @@ Manifest Layout::create(const std::filesystem::path& path, Seal& seal) const {
     manifest.entries[i].place = place_of(dataset, manifest.entries[i].bytes);
   }
   file.close("close " + path.string());
-  const PosixFile laid_out(path, PosixFile::Mode::write);
-  seal.file_bytes = laid_out.bytes();
-  laid_out.reserve(seal.file_bytes);
+  seal.file_bytes = memory.write_to(path);
   return manifest;
 }
 

@@ -122,9 +122,12 @@ void write_plot(const Comm& comm, const fs::path& folder, const std::string& kin
     check_room(folder, bytes + metadata);
     const fs::path path = folder / plot_name(kind, step), partial = path.string() + ".partial";
     try {
-      Hdf5Handle file = create_plot_hdf5(partial);
+      Hdf5Handle file = create_plot_hdf5();
       fill(file);
-      file.close("close " + partial.string());
+      const std::vector<std::byte> image = image_of(file);
+      file.close("close a plot file");
+      const PosixFile written(partial, PosixFile::Mode::create);
+      written.write(image, 0);
       rename_for_good(partial, path);
     } catch (const Stop&) {
       std::error_code ignored;

@@ -6,9 +6,12 @@
 #include <sys/statvfs.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <string>
+#include <vector>
 
 namespace bedflow {
 
@@ -19,8 +22,11 @@ Stop system_stop(const std::filesystem::path& path, const char* what, int error)
 }
 
 PosixFile::PosixFile(std::filesystem::path path, Mode mode) : path_(std::move(path)) {
-  const int flags = mode == Mode::write ? O_RDWR : mode == Mode::read ? O_RDONLY : O_RDONLY | O_DIRECTORY;
-  descriptor_ = ::open(path_.c_str(), flags | O_CLOEXEC);
+  const int flags = mode == Mode::write    ? O_RDWR
+                    : mode == Mode::create ? O_RDWR | O_CREAT | O_TRUNC
+                    : mode == Mode::read   ? O_RDONLY
+                                           : O_RDONLY | O_DIRECTORY;
+  descriptor_ = ::open(path_.c_str(), flags | O_CLOEXEC, 0644);
   if (descriptor_ < 0) fail("open", errno);
 }
 
@@ -68,6 +74,42 @@ void PosixFile::reserve(std::uint64_t bytes) const {
 
 void PosixFile::sync() const {
   if (::fsync(descriptor_) != 0) fail("sync", errno);
+}
+
+MemoryFile::MemoryFile() {
+  std::string name = "/dev/shm/bedflow-XXXXXX";
+  descriptor_ = ::mkostemp(name.data(), O_CLOEXEC);
+  if (descriptor_ < 0) throw system_stop(name, "create", errno);
+  path_ = name;
+}
+
+MemoryFile::~MemoryFile() {
+  unname();
+  ::close(descriptor_);
+}
+
+void MemoryFile::unname() {
+  if (!path_.empty()) ::unlink(path_.c_str());
+  path_.clear();
+}
+
+std::uint64_t MemoryFile::write_to(const std::filesystem::path& path) const {
+  const PosixFile from("/proc/self/fd/" + std::to_string(descriptor_), PosixFile::Mode::read), to(path, PosixFile::Mode::create);
+  const std::uint64_t length = from.bytes();
+  if (length > 0) to.reserve(length);
+  std::vector<std::byte> buffer(1 << 20);
+  off_t end = 0;
+  for (off_t start = 0; (start = ::lseek(descriptor_, end, SEEK_DATA)) >= 0;) {
+    end = ::lseek(descriptor_, start, SEEK_HOLE);
+    for (auto place = static_cast<std::uint64_t>(start); place < static_cast<std::uint64_t>(end);) {
+      const auto part = std::span(buffer).first(std::min<std::uint64_t>(buffer.size(), static_cast<std::uint64_t>(end) - place));
+      const std::size_t got = from.read(part, place);
+      to.write(part.first(got), place);
+      place += got;
+      if (got < part.size()) break;
+    }
+  }
+  return length;
 }
 
 void check_room(const std::filesystem::path& folder, std::uint64_t bytes) {

@@ -13,7 +13,7 @@ namespace bedflow {
 
 class PosixFile {
  public:
-  enum class Mode { read, write, folder };
+  enum class Mode { read, write, create, folder };
 
   PosixFile(std::filesystem::path path, Mode mode);
   ~PosixFile();
@@ -31,6 +31,25 @@ class PosixFile {
  private:
   [[noreturn]] void fail(const char* what, int error) const;
 
+  std::filesystem::path path_;
+  int descriptor_ = -1;
+};
+
+// A sparse file in memory (/dev/shm), for a checkpoint's layout. HDF5 never writes to a disk: what it has open when it meets a
+// full one it cannot close any more, and it ends the program over that.
+class MemoryFile {
+ public:
+  MemoryFile();
+  ~MemoryFile();
+  MemoryFile(const MemoryFile&) = delete;
+  MemoryFile& operator=(const MemoryFile&) = delete;
+
+  const std::filesystem::path& path() const { return path_; }
+  void unname();  // once it is open: a process that is killed leaves nothing behind
+  // The same bytes as a new file of that name, holes reserved and zero. Returns their number.
+  std::uint64_t write_to(const std::filesystem::path& path) const;
+
+ private:
   std::filesystem::path path_;
   int descriptor_ = -1;
 };
