@@ -15,12 +15,14 @@ namespace bedflow {
 
 namespace {
 
-// Measured on the Müller bed, one core (deploy/bench.sh bed and dem print them anew); they make the estimate of the wall time and
-// nothing else.
-constexpr double fluidized_substep_seconds = 0.014e-6;  // a particle, without history
-constexpr double resting_substep_seconds = 0.065e-6;    // the same in a bed at rest, five contacts each
-constexpr double history_factor = 1.35;
-constexpr double particle_step_seconds = 0.07e-6;  // to the grid and back
+// Measured on one core (deploy/bench.sh dem, transfer and gas print them anew); they make the estimate of the wall time and the
+// balance between ranks.
+constexpr double particle_substep_seconds = 9e-9;  // motion, walls
+constexpr double pair_substep_seconds = 4.8e-9;    // a listed pair, about every second touches: found, swept, listed
+constexpr double history_factor = 2;               // of a pair
+constexpr double resting_pairs = 3.7;              // listed, a particle
+constexpr double fluidized_pairs = 1.2;
+constexpr double particle_step_seconds = 0.06e-6;  // to the grid and back
 constexpr double cell_step_seconds = 0.25e-6;      // two outer iterations of SIMPLE
 constexpr double projection_cell_seconds = 0.21e-6;
 
@@ -130,7 +132,7 @@ void plan_space(Plan& plan) {
     }
     const double reach = scene.particles->largest() + scene.particles->laws.range() + plan.skin;
     for (int d = 0; d < 3; ++d) {
-      if (!scene.gas) plan.cells[d] = std::max(1, static_cast<int>(scene.size[d] / (2 * scene.particles->largest())));
+      if (!scene.gas) plan.cells[d] = std::max(1, static_cast<int>(2 * scene.size[d] / scene.particles->largest()));
       const double cell = scene.size[d] / plan.cells[d];
       if (plan.ranks > 1) plan.narrowest[d] = std::max(plan.ghosts, static_cast<int>(std::ceil(reach / cell)));
       if (scene.periodic[d] && scene.size[d] < 2 * reach) {
@@ -170,14 +172,15 @@ void plan_cost(Plan& plan) {
   plan.checkpoint_bytes = 100e3 + field * 5 + particles * (8 + 24.0 * (rotation ? 4 : 3) + (history ? 3 * 40 : 0));
   const auto steps = static_cast<double>(plan.steps);
   const bool projection = scene.gas && scene.gas->setup.method == GasMethod::projection;
-  const double cell_seconds = projection ? projection_cell_seconds : cell_step_seconds;
-  const double factor = particles * (history ? history_factor : 1);
-  const double substep = factor * (scene.coupling ? fluidized_substep_seconds : resting_substep_seconds);
-  plan.seconds =
-      steps * (cells * cell_seconds + (scene.coupling ? particles * particle_step_seconds : 0) + plan.substeps * substep);
+  StepCost& cost = plan.cost;
+  cost.cell = projection ? projection_cell_seconds : cell_step_seconds;
+  cost.particle = plan.substeps * particle_substep_seconds + (scene.coupling ? particle_step_seconds : 0);
+  cost.pair = plan.substeps * pair_substep_seconds * (history ? history_factor : 1);
+  const double pairs = scene.coupling ? fluidized_pairs : resting_pairs;
+  plan.seconds = steps * (cells * cost.cell + particles * (cost.particle + pairs * cost.pair));
   if (scene.particles && scene.particles->settling) {
     const double settled = std::min(1.2 * plan.fall_time, scene.particles->settling->duration);  // at rest soon after
-    plan.seconds += settled / plan.substep * factor * resting_substep_seconds;
+    plan.seconds += settled / plan.step * particles * (cost.particle + resting_pairs * cost.pair);
   }
   plan.seconds /= plan.ranks;
 }

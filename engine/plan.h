@@ -15,6 +15,13 @@ struct PlanItem {
   std::string why;
 };
 
+// Seconds of a step on one core of the machine of engine/README.md's figures.
+struct StepCost {
+  double cell = 0;      // of the gas
+  double particle = 0;  // all its sub-steps, to the grid and back
+  double pair = 0;      // of the pair list, all its sub-steps
+};
+
 struct Plan {
   Scene scene;
   int ranks = 1;
@@ -37,6 +44,8 @@ struct Plan {
   std::int64_t cell_count = 0, particle_count = 0, steps = 0;
   std::int64_t entering = 0;  // particles until the end
   int substeps = 0;           // per step
+  StepCost cost;
+  int balance_steps = 200;  // between two looks at where the cuts between the blocks stand
   double memory_bytes = 0, checkpoint_bytes = 0, seconds = 0;
   std::vector<PlanItem> items;
   std::vector<std::string> warnings;

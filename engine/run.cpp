@@ -11,8 +11,10 @@
 #include <sstream>
 #include <system_error>
 
+#include "balance.h"
 #include "case/case_scene.h"
 #include "checkpoint/file_names.h"
+#include "checkpoint/held_checkpoint.h"
 #include "plots.h"
 #include "report/job_folder.h"
 #include "simulation.h"
@@ -68,11 +70,10 @@ class Run {
   // ---- the parts of a run, in order
 
   void start() {
-    const Plan plan = make_plan(read_scene(options_.folder / "case.txtpb"), comm_.size());
-    simulation_ = std::make_unique<Simulation>(plan, comm_, timer_);
-    monitors_ = std::make_unique<Monitors>(simulation_->decomposition(), plan.scene.monitors, sink());
-    plan_ = plan;
-    const std::string from = resume();
+    plan_ = make_plan(read_scene(options_.folder / "case.txtpb"), comm_.size());
+    const Plan& plan = plan_;
+    monitors_ = std::make_unique<Monitors>(StatisticScene{plan.scene.size, plan.cells}, plan.scene.monitors, sink());
+    const std::string from = begin();
     folder_.started(comm_.size(), simulation_->steps(), simulation_->time(), plan.scene.end_time, from, plan.text());
     for (const std::string& warning : plan.warnings) folder_.warning(warning);
     for (const std::string& fault : checkpoint_faults_) folder_.warning(fault);
@@ -83,14 +84,15 @@ class Run {
     }
     folder_.statistics_resumed(0);  // an earlier attempt that never got to a checkpoint is void
     settle();
+    balance();
     timer_ = PhaseTimer();  // the summary is of the steps
     monitors_->observe(simulation_->observation(), 0, 0, 0);
     write_plots();
     write_checkpoint_now();  // settling is never done twice
   }
 
-  // Takes up the newest good checkpoint, or the one asked for. Empty: there is none.
-  std::string resume() {
+  // Takes up the newest good checkpoint, or the one asked for, and says its name; else the state at time 0.
+  std::string begin() {
     const auto checkpoints = options_.folder / "checkpoints";
     std::optional<CheckpointInfo> found;
     if (options_.from) {
@@ -105,11 +107,17 @@ class Run {
       }
     }
     if (!found) {
+      simulation_ = std::make_unique<Simulation>(plan_, comm_, timer_);
       simulation_->seed();
+      balance();
       return "";
     }
     const CheckpointReader reader(comm_, found->path);
+    const std::optional<Cuts> blocks = Simulation::blocks_of(reader, comm_);
+    simulation_ = blocks && fit(*blocks, plan_) ? std::make_unique<Simulation>(plan_, comm_, timer_, *blocks)
+                                                : std::make_unique<Simulation>(plan_, comm_, timer_);
     simulation_->restore(reader);
+    if (blocks != simulation_->decomposition().cuts()) balance();
     if (!restore_statistics(reader, *monitors_)) {
       folder_.info("the monitors are not those of the checkpoint: statistics begin here");
     }
@@ -151,6 +159,7 @@ class Run {
       if (agreed.failure)
         return {agreed.failure.reason, agreed.failure.message + ", in step " + std::to_string(simulation_->steps())};
       if (agreed.cancel_now) return {Reason::cancelled, "cancelled without a checkpoint"};
+      if (simulation_->steps() % static_cast<std::uint64_t>(plan_.balance_steps) == 0) balance();
       if (agreed.checkpoint || agreed.suspend || agreed.cancel || agreed.wall_limit) write_checkpoint_now();
       if (agreed.cancel) return {Reason::cancelled, "cancelled; the last checkpoint is kept"};
       if (agreed.suspend) return {Reason::suspended, "suspended" + at_checkpoint()};
@@ -159,6 +168,23 @@ class Run {
     }
     if (last_checkpoint_step_ != simulation_->steps()) write_checkpoint_now();
     return {Reason::finished, "the end time is reached"};
+  }
+
+  // Moves the cuts between the blocks where that pays: the state goes over as by a checkpoint. Ahead of a checkpoint that is due in
+  // the same step, so that who resumes from it goes on with these blocks.
+  void balance() {
+    const PhaseTimer::Scope scope(timer_, Phase::balance);
+    const std::optional<Cuts> cuts = better_cuts(simulation_->decomposition(), plan_, simulation_->particles());
+    if (!cuts) return;
+    const HeldCheckpoint held(comm_, simulation_->checkpoint());
+    count_rebuilds();
+    simulation_.reset();
+    simulation_ = std::make_unique<Simulation>(plan_, comm_, timer_, *cuts);
+    simulation_->restore(held);
+    ++totals_.block_moves;
+  }
+  void count_rebuilds() {
+    if (const Dem* dem = simulation_->particles()) totals_.list_rebuilds += static_cast<std::uint64_t>(dem->rebuilds());
   }
 
   void finish(Stop& outcome) {
@@ -185,7 +211,7 @@ class Run {
         totals_.mass_due = insertion->mass_due(simulation_->time());
         for (const InletState& state : insertion->states()) totals_.blocked_steps += static_cast<std::uint64_t>(state.blocked);
       }
-      if (const Dem* dem = simulation_->particles()) totals_.list_rebuilds = static_cast<std::uint64_t>(dem->rebuilds());
+      count_rebuilds();
       try {
         write_summary(comm_, options_.folder / "summary.json", plan_, timer_, totals_);
       } catch (const std::system_error& error) {
@@ -259,8 +285,9 @@ class Run {
     totals_.simulated_seconds += simulation_->last_step();
     const auto particles = static_cast<std::uint64_t>(simulation_->particle_count());
     totals_.particle_steps += particles;
-    totals_.particle_substeps += (simulation_->substeps() - totals_.substeps) * particles;
-    totals_.substeps = simulation_->substeps();
+    const auto substeps = static_cast<std::uint64_t>(simulation_->last_substeps());
+    totals_.particle_substeps += substeps * particles;
+    totals_.substeps += substeps;
     totals_.cell_steps += static_cast<std::uint64_t>(plan_.cell_count);
     totals_.gas_iterations += static_cast<std::uint64_t>(simulation_->gas_outcome().iterations);
     totals_.pressure_iterations += static_cast<std::uint64_t>(simulation_->gas_outcome().pressure_iterations);
@@ -277,7 +304,7 @@ class Run {
                       .end_time = plan_.scene.end_time,
                       .wall_seconds = wall_seconds(),
                       .eta_seconds = done > 0 ? std::max(0.0, left / speed) : -1,
-                      .substeps = simulation_->substeps(),
+                      .substeps = totals_.substeps,
                       .particles = static_cast<std::uint64_t>(simulation_->particle_count()),
                       .gas_iterations = simulation_->gas_outcome().iterations,
                       .phase = phase});

@@ -67,10 +67,10 @@ Simulation::CouplingPart::CouplingPart(const Decomposition& decomposition, const
                timer),
       fraction_before(gas.grid) {}
 
-Simulation::Simulation(const Plan& plan, const Comm& comm, PhaseTimer& timer)
+Simulation::Simulation(const Plan& plan, const Comm& comm, PhaseTimer& timer, Cuts cuts)
     : plan_(plan),
       timer_(timer),
-      decomposition_(comm, plan.cells, plan.scene.size, plan.scene.periodic, plan.tall, plan.narrowest),
+      decomposition_(comm, plan.scene.size, plan.scene.periodic, std::move(cuts)),
       controller_(plan) {
   if (plan.scene.gas) gas_ = std::make_unique<GasPart>(decomposition_, plan_, timer_);
   if (plan.scene.particles) {
@@ -187,7 +187,7 @@ void Simulation::advance_particles(double dt) {
     dem_->advance(substeps, dt / substeps, time_);
   }
   wall_loads_ = dem_->take_wall_loads();
-  substeps_ += static_cast<std::uint64_t>(substeps);
+  last_substeps_ = substeps;
   max_overlap_ = dem_->take_max_overlap();
 }
 

@@ -21,7 +21,9 @@ namespace bedflow {
 
 class Simulation {
  public:
-  Simulation(const Plan& plan, const Comm& comm, PhaseTimer& timer);
+  Simulation(const Plan& plan, const Comm& comm, PhaseTimer& timer)
+      : Simulation(plan, comm, timer, even_cuts(comm.size(), plan.cells, plan.scene.size, plan.tall, plan.narrowest)) {}
+  Simulation(const Plan& plan, const Comm& comm, PhaseTimer& timer, Cuts cuts);
 
   // The state at time 0: gas at rest or as the case says, particles at their places. Throws Stop(invalid_case).
   void seed();
@@ -29,9 +31,12 @@ class Simulation {
   // or no settling was asked for, or its time is over.
   bool settle();
   double settled_time() const { return settled_time_; }  // s
-  // The state of a checkpoint, written on any number of ranks. Throws Stop(invalid_case) when it is of another scene.
-  void restore(const CheckpointReader& checkpoint);
+  // The state of a checkpoint, made on any number of ranks. Throws Stop(invalid_case) when it is of another scene. The same blocks
+  // (blocks_of) go on with the same bits.
+  void restore(const CheckpointSource& from);
   CheckpointContent checkpoint() const;
+  // The cuts of the blocks that made the checkpoint; nothing if they were another number.
+  static std::optional<Cuts> blocks_of(const CheckpointSource& from, const Comm& comm);
 
   // One step of at most step_size(). Throws Stop(not_converged) on all ranks alike.
   void step();
@@ -42,7 +47,7 @@ class Simulation {
   bool finished() const;
   double step_size() const { return controller_.size(); }          // s
   double last_step() const { return last_step_; }                  // s, taken
-  std::uint64_t substeps() const { return substeps_; }             // of this process
+  int last_substeps() const { return last_substeps_; }             // of the last step
   std::int64_t particle_count() const { return particle_count_; }  // all ranks
   const Turnover& turnover() const { return turnover_; }           // of particles, since time 0
   const Insertion* insertion() const { return insertion_.get(); }  // null: nothing enters
@@ -95,9 +100,9 @@ class Simulation {
   void put_particles(CheckpointContent& content) const;
   void put_contacts(CheckpointContent& content) const;
   void put_turnover(CheckpointContent& content) const;
-  void restore_turnover(const CheckpointReader& from);
-  void restore_gas(const CheckpointReader& from);
-  void restore_particles(const CheckpointReader& from);
+  void restore_turnover(const CheckpointSource& from);
+  void restore_gas(const CheckpointSource& from);
+  void restore_particles(const CheckpointSource& from);
 
   Plan plan_;
   PhaseTimer& timer_;
@@ -107,7 +112,8 @@ class Simulation {
   std::unique_ptr<Insertion> insertion_;
   std::unique_ptr<CouplingPart> coupling_;
 
-  std::uint64_t steps_ = 0, substeps_ = 0;
+  std::uint64_t steps_ = 0;
+  int last_substeps_ = 0;
   StepController controller_;
   double time_ = 0, last_step_ = 0, settled_time_ = 0;
   double hidden_solids_ = 0;  // m³ cut by the floor of ε in the last step

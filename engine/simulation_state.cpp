@@ -1,6 +1,7 @@
 // The simulation's state to and from a checkpoint.
 #include <array>
 #include <cmath>
+#include <set>
 
 #include "particles/migration.h"
 #include "simulation.h"
@@ -35,7 +36,7 @@ CheckpointArray grid_array(const char* name, const char* unit, const char* meani
   return {name, unit, meaning, std::move(values), part, 1};
 }
 
-void read_grid(const CheckpointReader& from, const char* name, Field& field, const GridPart& part) {
+void read_grid(const CheckpointSource& from, const char* name, Field& field, const GridPart& part) {
   const std::vector<double> values = from.grid(name, part);
   const double* next = values.data();
   each(field, part, [&](double& value) { value = *next++; });
@@ -57,7 +58,27 @@ CheckpointArray rows(const char* name, const char* unit, const char* meaning, st
   return {name, unit, meaning, flat(values), std::nullopt, 3};
 }
 
+std::vector<std::int64_t> block_row(const Decomposition& decomposition) {
+  const Int3 first = decomposition.first(), cells = decomposition.cells();
+  return {first[0], first[1], first[2], cells[0], cells[1], cells[2]};
+}
+
 }  // namespace
+
+std::optional<Cuts> Simulation::blocks_of(const CheckpointSource& from, const Comm& comm) {
+  if (from.ranks() != comm.size() || !from.has("blocks")) return {};
+  const std::vector<std::int64_t> mine = from.integer_rows("blocks");
+  const std::vector<double> all = comm.gather_all(std::vector<double>(mine.begin(), mine.end()));
+  std::array<std::set<int>, 3> cuts;
+  for (std::size_t r = 0; r < all.size(); r += 6)
+    for (std::size_t d = 0; d < 3; ++d) {
+      cuts[d].insert(static_cast<int>(all[r + d]));
+      cuts[d].insert(static_cast<int>(all[r + d] + all[r + 3 + d]));
+    }
+  Cuts result;
+  for (int d = 0; d < 3; ++d) result[d].assign(cuts[d].begin(), cuts[d].end());
+  return result;
+}
 
 CheckpointContent Simulation::checkpoint() const {
   CheckpointContent content;
@@ -73,6 +94,8 @@ CheckpointContent Simulation::checkpoint() const {
                      {"controller/step_size", controller_.size()},
                      {"controller/last_step", last_step_},
                      {"controller/good_steps", controller_.good_steps()}};
+  content.arrays.push_back({"blocks", "", "each rank's first cells in x, y, z and numbers of cells", block_row(decomposition_),
+                            std::nullopt, 6});
   if (gas_) {
     const GasState& gas = gas_->state;
     content.arrays.push_back(
@@ -182,7 +205,7 @@ void Simulation::put_contacts(CheckpointContent& content) const {
   content.arrays.push_back(rows("contacts/wall_angle", "rad", "rolling angle θ as the particle sees it", wall_angles));
 }
 
-void Simulation::restore(const CheckpointReader& from) {
+void Simulation::restore(const CheckpointSource& from) {
   const auto same = [&](const char* name, const char* field, double here) {
     const double there = from.number(name);
     if (std::abs(there - here) > 1e-12 * std::abs(here)) {
@@ -208,7 +231,7 @@ void Simulation::restore(const CheckpointReader& from) {
   if (dem_) restore_particles(from);
 }
 
-void Simulation::restore_gas(const CheckpointReader& from) {
+void Simulation::restore_gas(const CheckpointSource& from) {
   GasState& gas = gas_->state;
   gas_->solver.prepare(gas, time_);
   read_grid(from, "gas/pressure", gas.pressure, part_of(gas_->grid));
@@ -223,8 +246,8 @@ void Simulation::restore_gas(const CheckpointReader& from) {
   if (coupling_) coupling_->transfer.mirror_at_faces(gas.fraction);
 }
 
-void Simulation::restore_particles(const CheckpointReader& from) {
-  const bool same_ranks = from.ranks() == decomposition_.comm().size();
+void Simulation::restore_particles(const CheckpointSource& from) {
+  const bool same_blocks = blocks_of(from, decomposition_.comm()) == decomposition_.cuts();
   ParticleStore store;
   const std::vector<Vec3> positions = vectors(from.rows("particles/position"));
   const std::vector<Vec3> velocities = vectors(from.rows("particles/velocity"));
@@ -255,8 +278,8 @@ void Simulation::restore_particles(const CheckpointReader& from) {
     }
   }
   std::vector<Vec3> at_rebuild;
-  if (same_ranks) at_rebuild = vectors(from.rows("particles/position_at_rebuild"));
-  if (!same_ranks) {
+  if (same_blocks) at_rebuild = vectors(from.rows("particles/position_at_rebuild"));
+  if (!same_blocks) {
     store.each_array(setup, [&](auto& array) { array.resize(store.owned); });
     store = redistribute(decomposition_, setup, std::move(store));
   }

@@ -84,7 +84,7 @@ void Simulation::put_turnover(CheckpointContent& content) const {
   }
 }
 
-void Simulation::restore_turnover(const CheckpointReader& from) {
+void Simulation::restore_turnover(const CheckpointSource& from) {
   const auto count = [&](const std::string& name) { return static_cast<std::int64_t>(from.number(name)); };
   const auto take = [&](const std::string& name) {
     return Amount{count("turnover/" + name + "_count"), from.number("turnover/" + name + "_mass")};

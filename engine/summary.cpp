@@ -124,6 +124,7 @@ void write_summary(const Comm& comm, const std::filesystem::path& path, const Pl
                   {"particles", totals.particles},
                   {"cells", plan.cell_count},
                   {"list_rebuilds", totals.list_rebuilds},
+                  {"block_moves", totals.block_moves},
                   {"gas_iterations", totals.gas_iterations},
                   {"pressure_iterations", totals.pressure_iterations},
                   {"phases", phases},

@@ -27,6 +27,7 @@ struct RunTotals {
   double mass_due = 0;              // kg of particles that found no room to enter yet
   std::uint64_t blocked_steps = 0;  // in which one found none, of all inlets
   std::uint64_t list_rebuilds = 0, gas_iterations = 0, pressure_iterations = 0;
+  std::uint64_t block_moves = 0;  // of the cuts between blocks
   double step_seconds = 0;  // wall, of this rank in steps
   Traffic traffic;          // of this rank in steps
 };

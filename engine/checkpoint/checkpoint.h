@@ -81,29 +81,43 @@ std::optional<CheckpointInfo> newest_good_checkpoint(const Comm& comm, const std
 // Of a file's blocks: all before anything is read, or those of an array when it is read.
 enum class Verified { whole, as_read };
 
+// What a state is restored from: a file, or the content that the ranks still hold (held_checkpoint.h).
+class CheckpointSource {
+ public:
+  virtual ~CheckpointSource() = default;
+  virtual std::uint64_t step() const = 0;
+  virtual double time() const = 0;
+  virtual int ranks() const = 0;  // that made it
+  virtual double number(const std::string& name) const = 0;
+  virtual bool has(const std::string& array) const = 0;
+  // The three below are collective. Part of the grid as asked for, x fastest; global must be the stored shape.
+  virtual std::vector<double> grid(const std::string& array, const GridPart& part) const = 0;
+  // Rows of this rank: as they were given if the number of ranks is the same, an even share of all rows otherwise.
+  virtual std::vector<double> rows(const std::string& array) const = 0;
+  virtual std::vector<std::int64_t> integer_rows(const std::string& array) const = 0;
+};
+
 // A verified file, open for reading by all ranks.
-class CheckpointReader {
+class CheckpointReader : public CheckpointSource {
  public:
   // Throws Stop(checkpoint_corrupt) naming dataset and block, on every rank alike; with as_read, reading does too.
   CheckpointReader(const Comm& comm, const std::filesystem::path& path, Verified verified = Verified::whole);
-  ~CheckpointReader();
+  ~CheckpointReader() override;
 
-  std::uint64_t step() const;
-  double time() const;
-  int ranks() const;  // that wrote it
+  std::uint64_t step() const override;
+  double time() const override;
+  int ranks() const override;
   bool has_number(const std::string& name) const;
-  double number(const std::string& name) const;
+  double number(const std::string& name) const override;
   std::map<std::string, double> numbers() const;
   // What lies there, each as the manifest has it; in the manifest's order. Throws Stop(checkpoint_corrupt) for a dataset that is
   // not plain numbers side by side where and as long as the manifest says.
   std::vector<Dataset> datasets() const;
-  bool has(const std::string& array) const;
+  bool has(const std::string& array) const override;
   std::string text(const std::string& array) const;
-  // The three below are collective. Part of the grid as asked for, x fastest; global must be the stored shape.
-  std::vector<double> grid(const std::string& array, const GridPart& part) const;
-  // Rows of this rank: as written if the number of ranks is the same, an even share of all rows otherwise.
-  std::vector<double> rows(const std::string& array) const;
-  std::vector<std::int64_t> integer_rows(const std::string& array) const;
+  std::vector<double> grid(const std::string& array, const GridPart& part) const override;
+  std::vector<double> rows(const std::string& array) const override;
+  std::vector<std::int64_t> integer_rows(const std::string& array) const override;
 
  private:
   struct File;

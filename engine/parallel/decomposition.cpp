@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <limits>
 #include <string>
+#include <utility>
 
+#include "base/check.h"
 #include "base/stop.h"
 
 namespace bedflow {
@@ -41,17 +43,54 @@ Int3 choose_ranks(int ranks, Int3 cells, Vec3 size, int tall, Int3 narrowest) {
 
 }  // namespace
 
-Decomposition::Decomposition(Comm comm, Int3 cells, Vec3 size, std::array<bool, 3> periodic, int tall, Int3 narrowest)
-    : comm_(std::move(comm)), global_cells_(cells), size_(size), periodic_(periodic) {
-  ranks_ = choose_ranks(comm_.size(), cells, size, tall, narrowest);
+Cuts even_cuts(int ranks, Int3 cells, Vec3 size, int tall, Int3 narrowest) {
+  const Int3 blocks = choose_ranks(ranks, cells, size, tall, narrowest);
+  Cuts cuts;
+  for (int d = 0; d < 3; ++d)
+    for (int place = 0; place <= blocks[d]; ++place)
+      cuts[d].push_back(static_cast<int>(static_cast<long>(cells[d]) * place / blocks[d]));
+  return cuts;
+}
+
+// By the best of each number of cells for one part fewer (dynamic programming).
+std::vector<int> cheapest_cuts(const std::vector<double>& cost, int parts, int narrowest) {
+  const int cells = static_cast<int>(cost.size());
+  CHECK(parts >= 1 && narrowest >= 1 && parts * narrowest <= cells, parts, narrowest, cells);
+  std::vector<double> below{0};
+  for (const double c : cost) below.push_back(below.back() + c);
+  constexpr double never = std::numeric_limits<double>::infinity();
+  std::vector<double> dearest(cells + 1, never), fewer;  // of the first so many cells in the parts so far
+  dearest[0] = 0;
+  std::vector<std::vector<int>> last(parts, std::vector<int>(cells + 1));  // where the last of these parts begins
+  for (int part = 0; part < parts; ++part) {
+    fewer.assign(cells + 1, never);
+    fewer.swap(dearest);
+    for (int end = narrowest; end <= cells; ++end)
+      for (int begin = end - narrowest; begin >= 0 && below[end] - below[begin] <= dearest[end]; --begin) {
+        const double dear = std::max(fewer[begin], below[end] - below[begin]);
+        if (dear <= dearest[end]) dearest[end] = dear, last[part][end] = begin;
+      }
+  }
+  std::vector<int> cuts(parts + 1, cells);
+  for (int part = parts - 1; part >= 0; --part) cuts[part] = last[part][cuts[part + 1]];
+  return cuts;
+}
+
+Decomposition::Decomposition(Comm comm, Vec3 size, std::array<bool, 3> periodic, Cuts cuts)
+    : comm_(std::move(comm)), cuts_(std::move(cuts)), size_(size), periodic_(periodic) {
+  for (int d = 0; d < 3; ++d) {
+    ranks_[d] = static_cast<int>(cuts_[d].size()) - 1;
+    global_cells_[d] = cuts_[d].back();
+  }
+  CHECK(ranks_[0] * ranks_[1] * ranks_[2] == comm_.size(), ranks_[0], ranks_[1], ranks_[2], comm_.size());
   const int rank = comm_.rank();
   place_ = {rank % ranks_[0], rank / ranks_[0] % ranks_[1], rank / (ranks_[0] * ranks_[1])};
   for (int d = 0; d < 3; ++d) {
-    first_[d] = first_cell(d, place_[d]);
-    const int end = first_cell(d, place_[d] + 1);
+    first_[d] = cuts_[d][place_[d]];
+    const int end = cuts_[d][place_[d] + 1];
     cells_[d] = end - first_[d];
-    low_[d] = size[d] * first_[d] / cells[d];
-    high_[d] = size[d] * end / cells[d];
+    low_[d] = size[d] * first_[d] / global_cells_[d];
+    high_[d] = size[d] * end / global_cells_[d];
     for (int side = 0; side < 2; ++side) {
       Int3 beside = place_;
       beside[d] += side == 0 ? -1 : 1;
@@ -62,13 +101,15 @@ Decomposition::Decomposition(Comm comm, Int3 cells, Vec3 size, std::array<bool, 
   }
 }
 
+int Decomposition::cell_of(int d, double x) const {
+  return std::clamp(static_cast<int>(x / size_[d] * global_cells_[d]), 0, global_cells_[d] - 1);
+}
+
 int Decomposition::owner(Vec3 point) const {
   Int3 place{};
   for (int d = 0; d < 3; ++d) {
-    const int cell = std::clamp(static_cast<int>(point[d] / size_[d] * global_cells_[d]), 0, global_cells_[d] - 1);
-    place[d] = cell * ranks_[d] / global_cells_[d];
-    while (first_cell(d, place[d]) > cell) --place[d];
-    while (first_cell(d, place[d] + 1) <= cell) ++place[d];
+    const auto after = std::upper_bound(cuts_[d].begin(), cuts_[d].end(), cell_of(d, point[d]));
+    place[d] = static_cast<int>(after - cuts_[d].begin()) - 1;
   }
   return rank_at(place);
 }

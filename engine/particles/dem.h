@@ -63,6 +63,7 @@ class Dem {
   Tuning tuning() const { return {setup_.skin, tuner_.counts}; }
   void set_tuning(const Tuning& tuning);               // before restore()
   std::int64_t rebuilds() const { return rebuilds_; }  // of the pair list since construction
+  std::vector<int> listed_pairs() const;               // of each owned particle
   // PARTICLE_LOST (id, place), DIVERGED (not finite, or further than its diameter in one sub-step): noted on this rank, to be
   // voted on.
   const Failure& failure() const { return failure_; }

@@ -91,6 +91,13 @@ std::vector<WallLoad> Dem::take_wall_loads() {
   return result;
 }
 
+std::vector<int> Dem::listed_pairs() const {
+  std::vector<int> count(particles_.rows.size());
+  for (std::size_t p = 0; p < list_.count(); ++p) ++count[list_.pairs[p].first], ++count[list_.pairs[p].second];
+  count.resize(particles_.owned);
+  return count;
+}
+
 double Dem::take_max_overlap() {
   return std::exchange(deepest_, 0);
 }

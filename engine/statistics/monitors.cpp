@@ -53,8 +53,8 @@ bool peaks(const Statistic& statistic) {
 
 }  // namespace
 
-Monitors::Monitors(const Decomposition& decomposition, std::vector<MonitorSetup> setups, StatisticsSink sink)
-    : scene_{decomposition.size(), decomposition.global_cells()}, sink_(std::move(sink)) {
+Monitors::Monitors(const StatisticScene& scene, std::vector<MonitorSetup> setups, StatisticsSink sink)
+    : scene_(scene), sink_(std::move(sink)) {
   for (MonitorSetup& setup : setups) {
     const std::size_t places = std::visit(
         [&]<class Law>(const Law& law) { return has_places<Law> ? places_of(law, scene_).size() : 1; }, setup.statistic);

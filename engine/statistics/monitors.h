@@ -63,7 +63,7 @@ struct StatisticsSink {
 
 class Monitors {
  public:
-  Monitors(const Decomposition& decomposition, std::vector<MonitorSetup> setups, StatisticsSink sink);
+  Monitors(const StatisticScene& scene, std::vector<MonitorSetup> setups, StatisticsSink sink);
 
   std::size_t size() const { return monitors_.size(); }
   const MonitorSetup& setup(std::size_t monitor) const { return monitors_[monitor].setup; }

@@ -1,5 +1,10 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <limits>
+#include <numeric>
+#include <random>
+
 #include "base/stop.h"
 #include "grid/halo.h"
 #include "parallel/decomposition.h"
@@ -35,6 +40,55 @@ TEST(Decomposition, RanksThatDoNotFitAreRefusedByName) {
     EXPECT_EQ(stop.reason, Reason::invalid_case);
     EXPECT_NE(std::string(stop.what()).find("1 x 1 x 1"), std::string::npos);
   }
+}
+
+// The dearest part of all divisions that are allowed, one by one.
+double dearest_of_best(const std::vector<double>& cost, std::size_t first, int parts, int narrowest) {
+  double sum = 0;
+  if (parts == 1) {
+    for (std::size_t c = first; c < cost.size(); ++c) sum += cost[c];
+    return sum;
+  }
+  double best = std::numeric_limits<double>::infinity();
+  for (std::size_t end = first; end + static_cast<std::size_t>((parts - 1) * narrowest) <= cost.size(); ++end) {
+    if (end >= first + static_cast<std::size_t>(narrowest))
+      best = std::min(best, std::max(sum, dearest_of_best(cost, end, parts - 1, narrowest)));
+    if (end < cost.size()) sum += cost[end];
+  }
+  return best;
+}
+
+TEST(Decomposition, CheapestCutsAreTheBestOfAll) {
+  std::mt19937 random(1);
+  std::uniform_int_distribution<int> any(0, 9);  // whole numbers: sums without round-off
+  for (int round = 0; round < 300; ++round) {
+    const int narrowest = 1 + round % 3, parts = 1 + round / 3 % 4;
+    std::vector<double> cost(static_cast<std::size_t>(parts * narrowest + round % 7));
+    for (double& c : cost) c = std::max(0, any(random) - 4);
+    const std::vector<int> cuts = cheapest_cuts(cost, parts, narrowest);
+    ASSERT_EQ(cuts.size(), static_cast<std::size_t>(parts) + 1);
+    EXPECT_EQ(cuts.front(), 0);
+    EXPECT_EQ(cuts.back(), static_cast<int>(cost.size()));
+    double dearest = 0;
+    for (int part = 0; part < parts; ++part) {
+      EXPECT_GE(cuts[part + 1] - cuts[part], narrowest);
+      dearest = std::max(dearest, std::accumulate(cost.begin() + cuts[part], cost.begin() + cuts[part + 1], 0.0));
+    }
+    EXPECT_EQ(dearest, dearest_of_best(cost, 0, parts, narrowest));
+  }
+}
+
+TEST(Decomposition, UnevenBlocksCoverTheBoxAndKnowTheirOwners) {
+  const Comm world = Comm::world();
+  const Decomposition even(world, {16, 8, 4}, {1.6, 0.8, 0.4}, {false, true, false});
+  Cuts cuts = even.cuts();
+  for (auto& direction : cuts)
+    if (direction.size() > 2) direction[1] -= 1;
+  const Decomposition uneven(world, even.size(), {false, true, false}, cuts);
+  EXPECT_EQ(world.sum(static_cast<std::int64_t>(uneven.cells()[0]) * uneven.cells()[1] * uneven.cells()[2]), 16 * 8 * 4);
+  EXPECT_EQ(uneven.owner(0.5 * (uneven.low() + uneven.high())), world.rank());
+  EXPECT_EQ(uneven.owner(uneven.low() + Vec3{1e-6, 1e-6, 1e-6}), world.rank());
+  EXPECT_EQ(uneven.owner(uneven.high() - Vec3{1e-6, 1e-6, 1e-6}), world.rank());
 }
 
 TEST(Halo, FillBringsWhatTheOwnerHoldsEdgesAndCornersToo) {

@@ -16,6 +16,10 @@ std::vector<ParticleType> spheres_of_two_kilograms() {
 
 constexpr double round_off = 1e-13;  // relative, of sums of tens of terms in any order
 
+StatisticScene scene_of(const Decomposition& decomposition) {
+  return {decomposition.size(), decomposition.global_cells()};
+}
+
 // A box 0.4 × 0.8 × 0.2 m of 4 × 8 × 2 cells with room for fields and particles.
 struct Box {
   Decomposition decomposition{Comm::world(), {4, 8, 2}, {0.4, 0.8, 0.2}, {false, false, false}};
@@ -82,14 +86,14 @@ MonitorSetup averaged(Statistic statistic, double start, double bin, int bins) {
 // The value of a series, observed once.
 double value_of(const Statistic& statistic, const Observation& now) {
   Results results;
-  Monitors monitors(now.decomposition, {every_step(statistic)}, results.sink());
+  Monitors monitors(scene_of(now.decomposition), {every_step(statistic)}, results.sink());
   monitors.observe(now, 1, 0.1, 0.1);
   return results.samples[0].empty() ? std::nan("") : results.samples[0][0].value;
 }
 // The values of a profile: its average over one bin of one step.
 std::vector<double> profile_of(const Statistic& statistic, const Observation& now) {
   Results results;
-  Monitors monitors(now.decomposition, {averaged(statistic, 0, 0.1, 1)}, results.sink());
+  Monitors monitors(scene_of(now.decomposition), {averaged(statistic, 0, 0.1, 1)}, results.sink());
   monitors.observe(now, 1, 0.1, 0.1);
   return results.bins[0].at(0).mean;
 }
@@ -140,7 +144,7 @@ TEST(VelocityProfile, IsTheMeanOfTheParticlesInEachTopHatBin) {
   EXPECT_EQ(values[1], 5);
   EXPECT_TRUE(std::isnan(values[2])) << "an empty bin has no velocity";
   EXPECT_EQ(values[3], -3);
-  const Monitors monitors(box.decomposition, {every_step(law)}, {});
+  const Monitors monitors(scene_of(box.decomposition), {every_step(law)}, {});
   EXPECT_TRUE(monitors.is_profile(0));
   EXPECT_EQ(monitors.unit(0), "m/s");
   EXPECT_NEAR(monitors.places(0)[3], 0.35, round_off);
@@ -169,7 +173,7 @@ TEST(VoidFractionProfile, IsLinearBetweenRowsAndAveragedOverTheDepth) {
   Box box;
   box.set(box.fraction, [](double x, double y, double z) { return 0.4 + 0.5 * x + 0.2 * y + 0.3 * (z - 0.1); });
   const auto values = profile_of(VoidFractionProfile{.height = 0.333}, box.observation());
-  const Monitors monitors(box.decomposition, {every_step(VoidFractionProfile{})}, {});
+  const Monitors monitors(scene_of(box.decomposition), {every_step(VoidFractionProfile{})}, {});
   const auto places = monitors.places(0);
   ASSERT_EQ(values.size(), 4u);
   ASSERT_EQ(places.size(), 4u);
@@ -207,7 +211,7 @@ double same(double time) {
 TEST(Monitors, SamplesAreTakenAtMultiplesOfTheIntervalInSpiteOfRoundOff) {
   const Box box;
   Results results;
-  Monitors monitors(box.decomposition, {{.name = "m", .statistic = MassBalance{}, .interval = 0.3}}, results.sink());
+  Monitors monitors(scene_of(box.decomposition), {{.name = "m", .statistic = MassBalance{}, .interval = 0.3}}, results.sink());
   monitors.observe(box.observation(), 0, 0, 0);
   walk(monitors, box.observation(), 0, 100, same, 100);
   std::vector<std::uint64_t> steps, expected;
@@ -220,7 +224,7 @@ TEST(Monitors, SamplesAreTakenAtMultiplesOfTheIntervalInSpiteOfRoundOff) {
 TEST(Monitors, BinsOfARampHoldExactlyTheirStepsInSpiteOfRoundOff) {
   const Box box;
   Results results;
-  Monitors monitors(box.decomposition, {averaged(MassBalance{}, 1, 0.7, 5)}, results.sink());
+  Monitors monitors(scene_of(box.decomposition), {averaged(MassBalance{}, 1, 0.7, 5)}, results.sink());
   walk(monitors, box.observation(), 0, 60, same);
   ASSERT_EQ(results.bins[0].size(), 5u);
   for (int i = 0; i < 5; ++i) {
@@ -234,7 +238,7 @@ TEST(Monitors, BinsOfARampHoldExactlyTheirStepsInSpiteOfRoundOff) {
 TEST(Monitors, AStepThatStraddlesAnEdgeCountsToTheBinThatHoldsItsEnd) {
   const Box box;
   Results results;
-  Monitors monitors(box.decomposition, {averaged(MassBalance{}, 0.5, 1, 2)}, results.sink());
+  Monitors monitors(scene_of(box.decomposition), {averaged(MassBalance{}, 0.5, 1, 2)}, results.sink());
   Observation now = box.observation();
   auto step = [&, n = 0](double time, double dt, double value) mutable {
     now.mass_residual = value;
@@ -256,7 +260,7 @@ TEST(Monitors, AStepThatStraddlesAnEdgeCountsToTheBinThatHoldsItsEnd) {
 TEST(Monitors, AConstantSignalHasItsValueAndNoDeviation) {
   const Box box;
   Results results;
-  Monitors monitors(box.decomposition, {averaged(MassBalance{}, 0, 1, 5)}, results.sink());
+  Monitors monitors(scene_of(box.decomposition), {averaged(MassBalance{}, 0, 1, 5)}, results.sink());
   walk(monitors, box.observation(), 0, 50, [](double) { return 0.1 + 1e9; });  // large beside its deviation: no cancellation
   ASSERT_EQ(results.bins[0].size(), 5u);
   for (const auto& [number, bin] : results.bins[0]) {
@@ -269,7 +273,7 @@ TEST(Monitors, InstantsWithAnEmptyBinAreLeftOutOfThatBin) {
   Box box;
   Results results;
   const VelocityProfile law{.height = 0.4, .half_height = 0.1, .bins = 2};
-  Monitors monitors(box.decomposition, {averaged(law, 0, 0.4, 1)}, results.sink());
+  Monitors monitors(scene_of(box.decomposition), {averaged(law, 0, 0.4, 1)}, results.sink());
   for (int step = 1; step <= 4; ++step) {
     box.clear();
     box.add({0.1, 0.4, 0.1}, {0, 1.0 * step, 0});
@@ -285,7 +289,7 @@ TEST(Monitors, InstantsWithAnEmptyBinAreLeftOutOfThatBin) {
 TEST(MaxOverlap, ASampleHoldsThePeakSinceTheSampleBefore) {
   const Box box;
   Results results;
-  Monitors monitors(box.decomposition, {{.name = "m", .statistic = MaxOverlap{}, .interval = 0.3}}, results.sink());
+  Monitors monitors(scene_of(box.decomposition), {{.name = "m", .statistic = MaxOverlap{}, .interval = 0.3}}, results.sink());
   Observation now = box.observation();
   const bool last_rank = now.decomposition.comm().rank() == now.decomposition.comm().size() - 1;
   for (int step = 1; step <= 7; ++step) {
@@ -313,13 +317,13 @@ TEST(Monitors, ResumedInTheMiddleOfABinTheyGoOnWithTheSameBits) {
   const auto signal = [](double time) { return std::sin(7 * time) / 3; };
   const Observation now = box.observation();
   Results through;
-  Monitors whole(box.decomposition, setups, through.sink());
+  Monitors whole(scene_of(box.decomposition), setups, through.sink());
   walk(whole, now, 0, 60, signal, 60);
   for (const int cut : {1, 7, 31, 52}) {
     Results a, b;
-    Monitors until(box.decomposition, setups, a.sink());
+    Monitors until(scene_of(box.decomposition), setups, a.sink());
     walk(until, now, 0, cut, signal);
-    Monitors after(box.decomposition, setups, b.sink());
+    Monitors after(scene_of(box.decomposition), setups, b.sink());
     after.restore(until.state());
     EXPECT_EQ(after.state(), until.state());
     walk(after, now, cut, 60, signal, 60);
@@ -343,8 +347,8 @@ TEST(Monitors, ResumedInTheMiddleOfABinTheyGoOnWithTheSameBits) {
 
 TEST(Monitors, AStateOfOtherMonitorsIsRefused) {
   const Box box;
-  const Monitors one(box.decomposition, {every_step(MassBalance{})}, {});
-  Monitors two(box.decomposition, {every_step(MassBalance{}), every_step(MaxOverlap{})}, {});
+  const Monitors one(scene_of(box.decomposition), {every_step(MassBalance{})}, {});
+  Monitors two(scene_of(box.decomposition), {every_step(MassBalance{}), every_step(MaxOverlap{})}, {});
   try {
     two.restore(one.state());
     FAIL() << "nothing was refused";
@@ -357,7 +361,7 @@ TEST(Monitors, EveryRankHoldsTheSameState) {
   Box box;
   for (int i = 0; i < 8; ++i) box.add({0.02 + 0.05 * i, 0.35 + 0.01 * i, 0.03 + 0.02 * i}, {0.1, i / 3.0, -1.0 / 7});
   Monitors monitors(
-      box.decomposition,
+      scene_of(box.decomposition),
       {averaged(KineticEnergy{}, 0, 5, 1), averaged(VelocityProfile{.height = 0.4, .half_height = 0.1, .bins = 3}, 0, 5, 1)}, {});
   walk(monitors, box.observation(), 0, 3, same);
   const Comm& comm = box.decomposition.comm();

@@ -3,7 +3,10 @@
 
 #include <algorithm>
 #include <cstring>
+#include <memory>
 
+#include "balance.h"
+#include "checkpoint/held_checkpoint.h"
 #include "support/scene.h"
 
 namespace bedflow {
@@ -140,6 +143,69 @@ TEST(Ranks, ACheckpointGoesOnOnAnotherNumberOfRanks) {
   run(together, 20);
   run(alone, 20);
   expect_alike(found(together, world), found(alone, self));
+}
+
+// A bed whose right third is empty.
+std::string leaning_bed() {
+  return with(with(tight_bed(), "count: 600", "count: 400"), "high { x: 0.015", "high { x: 0.01");
+}
+
+std::unique_ptr<Simulation> moved(const Simulation& from, const Plan& plan, const Comm& comm, PhaseTimer& timer,
+                                  const Cuts& cuts) {
+  const HeldCheckpoint held(comm, from.checkpoint());
+  auto result = std::make_unique<Simulation>(plan, comm, timer, cuts);
+  result->restore(held);
+  return result;
+}
+
+// Particles of the fullest rank over the ranks' mean.
+double fullest(const Simulation& simulation, const Comm& comm) {
+  const auto owned = static_cast<std::int64_t>(simulation.particles()->particles().owned);
+  return static_cast<double>(comm.max(owned) * comm.size()) / static_cast<double>(comm.sum(owned));
+}
+
+TEST(Blocks, MovedToWhereTheWorkIsLeaveTheStateAsItIs) {
+  const Comm world = Comm::world();
+  const Plan plan = make_plan(scene_of(world, leaning_bed()), world.size());
+  PhaseTimer timer;
+  Simulation stays(plan, world, timer);
+  stays.seed();
+  run(stays, 20);
+  const auto cuts = better_cuts(stays.decomposition(), plan, stays.particles());
+  ASSERT_EQ(cuts.has_value(), world.size() > 1);
+  if (!cuts) return;
+  EXPECT_TRUE(fit(*cuts, plan));
+  const auto goes = moved(stays, plan, world, timer, *cuts);
+  EXPECT_LT(fullest(*goes, world), 0.8 * fullest(stays, world));
+  EXPECT_FALSE(better_cuts(goes->decomposition(), plan, goes->particles()));  // at rest there
+
+  const Found before = found(stays, world), after = found(*goes, world);
+  EXPECT_EQ(before.position, after.position);
+  EXPECT_NEAR(after.kinetic / before.kinetic, 1, 1e-14);
+  EXPECT_NEAR(after.fraction / before.fraction, 1, 1e-14);  // summed in another order
+  EXPECT_NEAR(after.pressure / before.pressure, 1, 1e-14);
+  run(stays, 20);
+  run(*goes, 20);
+  expect_alike(found(stays, world), found(*goes, world));
+}
+
+TEST(Blocks, OfACheckpointAreTakenUpAndGiveTheSameBits) {
+  const Comm world = Comm::world();
+  const Plan plan = make_plan(scene_of(world, leaning_bed()), world.size());
+  const TestFolder folder(world);
+  PhaseTimer timer;
+  Simulation begun(plan, world, timer);
+  begun.seed();
+  const auto cuts = better_cuts(begun.decomposition(), plan, begun.particles());
+  const auto through = moved(begun, plan, world, timer, cuts.value_or(begun.decomposition().cuts()));
+  run(*through, 10);
+  const CheckpointReader reader(world, write_checkpoint(world, folder.path(), through->checkpoint(), 2).path);
+  ASSERT_EQ(Simulation::blocks_of(reader, world), through->decomposition().cuts());
+  Simulation resumed(plan, world, timer, *Simulation::blocks_of(reader, world));
+  resumed.restore(reader);
+  run(*through, 10);
+  run(resumed, 10);
+  EXPECT_TRUE(state_of(resumed) == state_of(*through));
 }
 
 TEST(Scene, OfGasAloneAndOfParticlesAloneRun) {

@@ -122,6 +122,30 @@ TEST_F(JobRun, ADamagedNewestCheckpointIsToldAndTheOneBeforeIsUsed) {
   EXPECT_TRUE(told);
 }
 
+// Particles that fall to one side take the cuts between the blocks with them.
+TEST_F(JobRun, BlocksFollowTheParticlesAlsoOverAResume) {
+  const std::string falling = R"(name: "falling" domain { size { x: 0.06 y: 0.012 z: 0.012 } } gravity { x: 4 y: -5 z: -5 }
+    particles { diameter: 0.002 density: 1000 linear_spring_dashpot { stiffness: 1000 restitution: 0.5 } spring { friction: 0.3 }
+      symplectic_euler {} random { count: 250 seed: 1 region { low {} high { x: 0.03 y: 0.012 z: 0.012 } } } }
+    monitors { name: "energy" kinetic_energy {} interval: 0.001 } time { end: 0.1 })";
+  const auto through = fresh("through", falling);
+  EXPECT_EQ(run_in(through), Reason::finished);
+  const auto stopped = fresh("stopped", falling, "checkpoints { every_steps: 130 }");
+  put(comm, stopped / "control.txtpb", "sequence: 1 command: SUSPEND");
+  EXPECT_EQ(run_in(stopped), Reason::suspended);
+  EXPECT_EQ(run_in(stopped), Reason::finished);
+  EXPECT_EQ(final_state(comm, stopped), final_state(comm, through));
+  const auto moves = [](const std::filesystem::path& job) {
+    return nlohmann::json::parse(std::ifstream(job / "summary.json"))["block_moves"].get<int>();
+  };
+  if (comm.size() > 1) {
+    EXPECT_GT(moves(through), 1);  // at the start, and on the way
+    EXPECT_EQ(moves(stopped), moves(through) - 1);  // the start's was in its first attempt
+  } else {
+    EXPECT_EQ(moves(through), 0);
+  }
+}
+
 TEST_F(JobRun, EveryReasonToStopHasItsName) {
   std::string bed = short_bed();
   const auto cancelled = fresh("cancelled", bed);

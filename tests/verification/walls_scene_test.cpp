@@ -132,7 +132,7 @@ TEST(WallRun, MonitorsTellWhatTheWallsReceive) {
   simulation.seed();
   std::vector<double> last(2);
   std::size_t samples = 0;
-  Monitors monitors(simulation.decomposition(), plan.scene.monitors,
+  Monitors monitors({plan.scene.size, plan.cells}, plan.scene.monitors,
                     {[&](const SampleOut& sample) {
                        last[sample.monitor] = sample.value;
                        ++samples;
