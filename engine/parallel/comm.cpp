@@ -11,8 +11,10 @@
 namespace bedflow {
 
 struct Comm::Handle {
-  MPI_Comm comm;
-  mutable Traffic traffic{};
+  MPI_Comm comm = MPI_COMM_SELF;
+  Traffic traffic{};
+  std::int64_t pending = 0;  // the value of a maximum under way
+  MPI_Request request = MPI_REQUEST_NULL;
 };
 
 namespace {
@@ -43,7 +45,7 @@ Counted message(Traffic& traffic, int to, std::size_t bytes) {
 }
 
 template <class T, class Handle>
-T reduce(T value, MPI_Datatype type, MPI_Op op, const Handle& handle) {
+T reduce(T value, MPI_Datatype type, MPI_Op op, Handle& handle) {
   const Counted counted = collective(handle.traffic);
   MPI_Allreduce(MPI_IN_PLACE, &value, 1, type, op, handle.comm);
   return value;
@@ -68,17 +70,17 @@ MpiSession::~MpiSession() {
   if (started) MPI_Finalize();
 }
 
-Comm::Comm(std::shared_ptr<const Handle> handle, int rank, int size) : handle_(std::move(handle)), rank_(rank), size_(size) {}
+Comm::Comm(std::shared_ptr<Handle> handle, int rank, int size) : handle_(std::move(handle)), rank_(rank), size_(size) {}
 Comm Comm::world() {
   int started = 0, rank = 0, size = 1;
   MPI_Initialized(&started);
   if (!started) return self();
   MPI_Comm_rank(MPI_COMM_WORLD, &rank);
   MPI_Comm_size(MPI_COMM_WORLD, &size);
-  return {std::make_shared<const Handle>(Handle{MPI_COMM_WORLD}), rank, size};
+  return {std::make_shared<Handle>(Handle{.comm = MPI_COMM_WORLD}), rank, size};
 }
 Comm Comm::self() {
-  return {nullptr, 0, 1};
+  return {std::make_shared<Handle>(), 0, 1};
 }
 
 double Comm::sum(double value) const {
@@ -103,6 +105,20 @@ void Comm::sum(std::span<double> values) const {
   if (size_ == 1) return;
   const Counted counted = collective(handle_->traffic);
   MPI_Allreduce(MPI_IN_PLACE, values.data(), static_cast<int>(values.size()), MPI_DOUBLE, MPI_SUM, handle_->comm);
+}
+
+void Comm::begin_max(std::int64_t value) const {
+  handle_->pending = value;
+  if (size_ == 1) return;
+  const Counted counted = collective(handle_->traffic);
+  MPI_Iallreduce(MPI_IN_PLACE, &handle_->pending, 1, MPI_INT64_T, MPI_MAX, handle_->comm, &handle_->request);
+}
+std::int64_t Comm::end_max() const {
+  if (size_ > 1) {
+    const Counted counted(handle_->traffic);
+    MPI_Wait(&handle_->request, MPI_STATUS_IGNORE);
+  }
+  return handle_->pending;
 }
 
 std::int64_t Comm::sum_before(std::int64_t value) const {
@@ -221,7 +237,7 @@ void Comm::barrier() const {
   MPI_Barrier(handle_->comm);
 }
 Traffic Comm::traffic() const {
-  return handle_ ? handle_->traffic : Traffic{};
+  return handle_->traffic;
 }
 void Comm::abort(int exit_code) const {
   if (size_ > 1) MPI_Abort(handle_->comm, exit_code);

@@ -52,6 +52,9 @@ class Comm {
   double min(double value) const;
   bool any(bool value) const;
   void sum(std::span<double> values) const;  // element by element, in place
+  // A maximum over all ranks that is under way while exchanges pass. One at a time.
+  void begin_max(std::int64_t value) const;
+  std::int64_t end_max() const;
 
   // Sum over the ranks below this one; 0 on rank 0.
   std::int64_t sum_before(std::int64_t value) const;
@@ -78,8 +81,8 @@ class Comm {
 
  private:
   struct Handle;
-  Comm(std::shared_ptr<const Handle> handle, int rank, int size);
-  std::shared_ptr<const Handle> handle_;
+  Comm(std::shared_ptr<Handle> handle, int rank, int size);
+  std::shared_ptr<Handle> handle_;
   int rank_ = 0;
   int size_ = 1;
 };

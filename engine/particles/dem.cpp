@@ -184,11 +184,12 @@ void Dem::keep_list_valid(bool far, double dt) {
   ++tuner_.counts.substeps;
   if (tuner_.due()) status = outdated;
   if (failure_) status = failed;
-  std::int64_t agreed = status;
+  std::int64_t agreed = valid;
   {
     const PhaseTimer::Scope scope(timer_, Phase::migration, particles_.owned);
-    agreed = decomposition_.comm().max(agreed);
-    if (agreed == valid) forward_ghosts();
+    decomposition_.comm().begin_max(status);
+    forward_ghosts();  // while the ranks agree; in vain when one of them says no
+    agreed = decomposition_.comm().end_max();
   }
   if (agreed == outdated) rebuild();
   stopped_ = agreed == failed;

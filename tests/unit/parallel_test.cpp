@@ -164,6 +164,19 @@ TEST(Comm, ReductionsAreTheSameOnEveryRank) {
   EXPECT_EQ(world.broadcast(world.root() ? "from the root" : ""), "from the root");
 }
 
+TEST(Comm, AMaximumIsUnderWayWhileExchangesPass) {
+  const Comm world = Comm::world();
+  for (int round = 0; round < 100; ++round) {
+    world.begin_max(round % world.size() == world.rank() ? round : -1);
+    const std::vector<double> send(8, world.rank());
+    std::vector<double> receive(8);
+    const int next = (world.rank() + 1) % world.size(), before = (world.rank() + world.size() - 1) % world.size();
+    world.exchange(next, send, before, std::span(receive));
+    EXPECT_EQ(receive.front(), before);
+    EXPECT_EQ(world.end_max(), round);
+  }
+}
+
 TEST(Comm, ExchangeAllDeliversEveryMessage) {
   const Comm world = Comm::world();
   std::vector<std::vector<double>> messages(world.size());
