@@ -7,7 +7,8 @@ namespace bedflow {
 
 namespace {
 
-// The move costs about as much as thirty steps (the state goes over, all parts are built anew); plan.balance_steps are a few hundred.
+// The move costs about as much as thirty steps (the state goes over, all parts are built anew); plan.balance_steps are a few
+// hundred.
 constexpr double worth_it = 0.95;
 
 double cell_seconds(const Plan& plan) {
@@ -15,8 +16,8 @@ double cell_seconds(const Plan& plan) {
 }
 
 // Of each slab of cells across direction d, all ranks together, direction by direction.
-std::array<std::vector<double>, 3> slab_costs(const Decomposition& decomposition, const Plan& plan, const ParticleStore* particles,
-                                              const std::vector<double>& costs) {
+std::array<std::vector<double>, 3> slab_costs(const Decomposition& decomposition, const Plan& plan,
+                                              const ParticleStore* particles, const std::vector<double>& costs) {
   const Int3 cells = decomposition.global_cells();
   std::vector<double> all(static_cast<std::size_t>(cells[0] + cells[1] + cells[2]));
   const std::array<int, 3> begin{0, cells[0], cells[0] + cells[1]};

@@ -170,8 +170,8 @@ class Run {
     return {Reason::finished, "the end time is reached"};
   }
 
-  // Moves the cuts between the blocks where that pays: the state goes over as by a checkpoint. Ahead of a checkpoint that is due in
-  // the same step, so that who resumes from it goes on with these blocks.
+  // Moves the cuts between the blocks where that pays: the state goes over as by a checkpoint. Ahead of a checkpoint that is due
+  // in the same step, so that who resumes from it goes on with these blocks.
   void balance() {
     const PhaseTimer::Scope scope(timer_, Phase::balance);
     const std::optional<Cuts> cuts = better_cuts(simulation_->decomposition(), plan_, simulation_->particles());

@@ -68,10 +68,7 @@ Simulation::CouplingPart::CouplingPart(const Decomposition& decomposition, const
       fraction_before(gas.grid) {}
 
 Simulation::Simulation(const Plan& plan, const Comm& comm, PhaseTimer& timer, Cuts cuts)
-    : plan_(plan),
-      timer_(timer),
-      decomposition_(comm, plan.scene.size, plan.scene.periodic, std::move(cuts)),
-      controller_(plan) {
+    : plan_(plan), timer_(timer), decomposition_(comm, plan.scene.size, plan.scene.periodic, std::move(cuts)), controller_(plan) {
   if (plan.scene.gas) gas_ = std::make_unique<GasPart>(decomposition_, plan_, timer_);
   if (plan.scene.particles) {
     dem_ = std::make_unique<Dem>(decomposition_, dem_setup(plan_), plan.scene.particles->laws, timer_, plan.scene.walls);

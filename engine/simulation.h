@@ -31,8 +31,8 @@ class Simulation {
   // or no settling was asked for, or its time is over.
   bool settle();
   double settled_time() const { return settled_time_; }  // s
-  // The state of a checkpoint, made on any number of ranks. Throws Stop(invalid_case) when it is of another scene. The same blocks
-  // (blocks_of) go on with the same bits.
+  // The state of a checkpoint, made on any number of ranks. Throws Stop(invalid_case) when it is of another scene. The same
+  // blocks (blocks_of) go on with the same bits.
   void restore(const CheckpointSource& from);
   CheckpointContent checkpoint() const;
   // The cuts of the blocks that made the checkpoint; nothing if they were another number.

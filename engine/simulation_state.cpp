@@ -94,8 +94,8 @@ CheckpointContent Simulation::checkpoint() const {
                      {"controller/step_size", controller_.size()},
                      {"controller/last_step", last_step_},
                      {"controller/good_steps", controller_.good_steps()}};
-  content.arrays.push_back({"blocks", "", "each rank's first cells in x, y, z and numbers of cells", block_row(decomposition_),
-                            std::nullopt, 6});
+  content.arrays.push_back(
+      {"blocks", "", "each rank's first cells in x, y, z and numbers of cells", block_row(decomposition_), std::nullopt, 6});
   if (gas_) {
     const GasState& gas = gas_->state;
     content.arrays.push_back(

@@ -28,8 +28,8 @@ struct RunTotals {
   std::uint64_t blocked_steps = 0;  // in which one found none, of all inlets
   std::uint64_t list_rebuilds = 0, gas_iterations = 0, pressure_iterations = 0;
   std::uint64_t block_moves = 0;  // of the cuts between blocks
-  double step_seconds = 0;  // wall, of this rank in steps
-  Traffic traffic;          // of this rank in steps
+  double step_seconds = 0;        // wall, of this rank in steps
+  Traffic traffic;                // of this rank in steps
 };
 
 // Collective; rank 0 writes. Wall seconds, steps, sub-steps, and seconds and nanoseconds per unit of work of every phase, per

@@ -28,7 +28,7 @@ CaseRead read_case(const std::string& text);
 CaseRead read_case_file(const std::filesystem::path& path);  // a file that cannot be read is a fault too
 
 // All faults of a case: first the generic walker over the field options (required, bounds, NaN and infinity, patterns, numbers of
-// items, choices, not built yet), then the rules that join fields (both fields named).
+// items, choices), then the rules that join fields (both fields named).
 std::vector<CaseFault> check_case(const v1::Case& value);
 
 std::string case_text(const v1::Case& value);  // text format

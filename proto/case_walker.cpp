@@ -69,8 +69,6 @@ class Walker {
       check_items(message, field, path);
     } else if (!access.HasField(message, &field)) {
       if (parameter.required()) report_missing(path, parameter);
-    } else if (parameter.has_not_built_yet()) {
-      report(path, "not built yet: " + parameter.not_built_yet());
     } else {
       check_value(message, field, path, bounds);
     }
@@ -156,13 +154,9 @@ class Walker {
   void check_choice(const Message& message, const OneofDescriptor& choice, const std::string& path) {
     if (!choice_of(choice).required() || message.GetReflection()->HasOneof(message, &choice)) return;
     std::string arms;
-    int built = 0;
-    for (int i = 0; i < choice.field_count(); ++i) {
-      if (parameter_of(*choice.field(i)).has_not_built_yet()) continue;
-      arms += (built++ > 0 ? ", " : "") + choice.field(i)->name();
-    }
+    for (int i = 0; i < choice.field_count(); ++i) arms += (i > 0 ? ", " : "") + choice.field(i)->name();
     report(child_path(path, choice.name()), "is missing: " + choice_of(choice).meaning() +
-                                                (built > 1 ? "; set one of " : "; set ") + arms + " in " +
+                                                (choice.field_count() > 1 ? "; set one of " : "; set ") + arms + " in " +
                                                 (path.empty() ? "the case" : path));
   }
 };

@@ -7,7 +7,7 @@
 
 namespace bedflow {
 
-// Required, bounds, NaN and infinity, patterns, numbers of items, choices, not built yet, fields this build does not know.
+// Required, bounds, NaN and infinity, patterns, numbers of items, choices, fields this build does not know.
 // Bounds on a field of type Vector hold for each component.
 std::vector<CaseFault> walk_case(const v1::Case& value);
 

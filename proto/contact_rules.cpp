@@ -7,7 +7,7 @@
 namespace bedflow {
 namespace {
 
-constexpr const char* walls = "wall";
+constexpr const char* faces = "wall";
 
 // Each tangential spring belongs to a normal law: its stiffness comes from it.
 void check_springs(const v1::Particles& particles, CaseFaults& faults) {
@@ -49,21 +49,29 @@ void check_read(const v1::Particles& particles, const v1::PairContact& pair, con
   check(pair.has_hamaker(), particles.has_van_der_waals(), "hamaker", "particles.van_der_waals");
 }
 
-void check_pairs(const v1::Particles& particles, CaseFaults& faults) {
+void check_pairs(const v1::Case& value, CaseFaults& faults) {
+  const v1::Particles& particles = value.particles();
+  std::set<std::string> walls{faces};
+  for (const v1::Wall& wall : value.walls()) walls.insert(wall.name());
   std::set<std::pair<std::string, std::string>> seen;
   for (int i = 0; i < particles.pairs_size(); ++i) {
     const v1::PairContact& pair = particles.pairs(i);
     const std::string path = item_path("particles.pairs", i);
     check_type_name(particles, pair.first(), path + ".first", faults);
-    if (pair.second() != walls) check_type_name(particles, pair.second(), path + ".second", faults);
+    if (!walls.contains(pair.second()) && !type_named(particles, pair.second())) {
+      std::string names;
+      for (const v1::ParticleType& type : particles.types()) names += type.name() + ", ";
+      for (const v1::Wall& wall : value.walls()) names += wall.name() + ", ";
+      faults.push_back({path + ".second", "is \"" + pair.second() + "\": it must be one of " + names + faces});
+    }
     if (!seen.insert(std::minmax(pair.first(), pair.second())).second)
       faults.push_back({path, "is the second one of " + pair.first() + " and " + pair.second() + ": put all into one"});
     check_read(particles, pair, path, faults);
   }
   for (int i = 0; i < particles.types_size(); ++i)
-    if (particles.types(i).name() == walls)
-      faults.push_back(
-          {item_path("particles.types", i) + ".name", "is wall, which is what particles.pairs calls the walls: rename it"});
+    if (walls.contains(particles.types(i).name()))
+      faults.push_back({item_path("particles.types", i) + ".name",
+                        "is " + particles.types(i).name() + ", which is a wall in particles.pairs: rename it"});
 }
 
 // The force of the gas in these exchanges takes the velocity at the start of a sub-step.
@@ -83,7 +91,7 @@ void check_contacts(const v1::Case& value, CaseFaults& faults) {
   check_springs(value.particles(), faults);
   check_rolling(value.particles(), faults);
   check_reach(value.particles(), faults);
-  check_pairs(value.particles(), faults);
+  check_pairs(value, faults);
   check_integrator(value, faults);
 }
 

@@ -79,8 +79,7 @@ std::string allowed_values(const FieldDescriptor& field) {
 std::string row(const FieldDescriptor& field) {
   const v1::Parameter& parameter = parameter_of(field);
   return "| `" + field.name() + "` | " + type_text(field) + " | " + parameter.unit() + " | " + default_text(field) + " | " +
-         allowed_values(field) + " | " + parameter.meaning() + " | " + (parameter.has_not_built_yet() ? "not yet" : "yes") +
-         " |\n";
+         allowed_values(field) + " | " + parameter.meaning() + " |\n";
 }
 
 std::string choice_text(const OneofDescriptor& choice) {
@@ -93,7 +92,7 @@ std::string choice_text(const OneofDescriptor& choice) {
 std::string section(const Descriptor& type) {
   std::string text = "\n## " + type.name() + "\n\n";
   if (type.field_count() == 0) return text + "No fields: write `{}`.\n";
-  text += "| field | type | unit | default | allowed | meaning | built |\n|---|---|---|---|---|---|---|\n";
+  text += "| field | type | unit | default | allowed | meaning |\n|---|---|---|---|---|---|\n";
   for (int i = 0; i < type.field_count(); ++i) text += row(*type.field(i));
   for (int i = 0; i < type.oneof_decl_count(); ++i) text += choice_text(*type.oneof_decl(i));
   return text;
@@ -111,7 +110,6 @@ void append_sections(const Descriptor& type, std::set<std::string>& seen, std::s
 void append_laws(const Descriptor& type, const std::string& path, std::vector<std::string>& laws) {
   for (int i = 0; i < type.field_count(); ++i) {
     const FieldDescriptor& field = *type.field(i);
-    if (parameter_of(field).has_not_built_yet()) continue;
     const OneofDescriptor* choice = field.real_containing_oneof();
     const std::string place = child_path(choice == nullptr ? path : child_path(path, choice->name()), field.name());
     if (choice != nullptr) laws.push_back(place);

@@ -19,7 +19,7 @@ enum class Phase {
   momentum,     // gas velocity
   pressure,     // gas pressure correction
   halo,         // ghost cells of fields
-  balance,        // moving the cuts between blocks
+  balance,      // moving the cuts between blocks
   statistics,
   checkpoint,
   output,  // events, plot files
@@ -27,8 +27,8 @@ enum class Phase {
 };
 inline constexpr int phase_count = 15;
 inline constexpr std::array<std::string_view, phase_count> phase_names = {
-    "pairs",    "contacts", "walls", "integration", "migration",  "deposit", "sample",
-    "momentum", "pressure", "halo",  "balance",     "statistics", "checkpoint", "output",  "other"};
+    "pairs",    "contacts", "walls",   "integration", "migration",  "deposit", "sample", "momentum",
+    "pressure", "halo",     "balance", "statistics",  "checkpoint", "output",  "other"};
 
 class PhaseTimer {
  public:

@@ -61,18 +61,26 @@ void refine(Parameters& to, const v1::PairContact& pair) {
   if (pair.has_hamaker()) to.hamaker = pair.hamaker();
 }
 
-// Of a pair of types, or of a type and the walls.
-Parameters parameters(const v1::Particles& from, const std::string& first, const std::string& second) {
-  Parameters to = common(from, second == "wall");
+void refine(Parameters& to, const v1::Particles& from, const std::string& first, const std::string& second) {
   for (const v1::PairContact& pair : from.pairs())
     if ((pair.first() == first && pair.second() == second) || (pair.first() == second && pair.second() == first))
       refine(to, pair);
+}
+
+// Of a pair of types, or of a type and the faces of the box.
+Parameters parameters(const v1::Particles& from, const std::string& first, const std::string& second) {
+  Parameters to = common(from, second == "wall");
+  refine(to, from, first, second);
   return to;
 }
 
-void refine(Parameters& to, const v1::Wall& wall) {
+// Of a type and a wall of the scene: as on the faces of the box but for what the wall says, and what the pair of the two says.
+Parameters parameters(const v1::Particles& from, const std::string& type, const v1::Wall& wall) {
+  Parameters to = parameters(from, type, "wall");
   if (wall.has_restitution()) to.restitution = wall.restitution();
   if (wall.has_friction()) to.friction = wall.friction();
+  refine(to, from, type, wall.name());
+  return to;
 }
 
 // make(parameters) for each pair of types, each type on the faces of the box, and each wall and type.
@@ -84,11 +92,7 @@ auto table(const v1::Case& from, const std::vector<ContactType>& types, Make mak
     result.walls.push_back(make(parameters(from.particles(), types[b].name, "wall")));
   }
   for (const v1::Wall& wall : from.walls())
-    for (const ContactType& type : types) {
-      Parameters own = parameters(from.particles(), type.name, "wall");
-      refine(own, wall);
-      result.walls.push_back(make(own));
-    }
+    for (const ContactType& type : types) result.walls.push_back(make(parameters(from.particles(), type.name, wall)));
   return result;
 }
 

@@ -15,12 +15,12 @@ using Int3 = std::array<int, 3>;
 using Cuts = std::array<std::vector<int>, 3>;
 
 // Blocks as equal as whole cells allow, their cuts of the least area. cells: of the whole box; size: its edges in m; tall: the
-// direction that is cut only when the others cannot be (up: beds are dense below and empty above), or -1. narrowest: no block gets
-// fewer cells a direction. Throws Stop(invalid_case) when the ranks cannot be placed.
+// direction that is cut only when the others cannot be (up: beds are dense below and empty above), or -1. narrowest: no block
+// gets fewer cells a direction. Throws Stop(invalid_case) when the ranks cannot be placed.
 Cuts even_cuts(int ranks, Int3 cells, Vec3 size, int tall = -1, Int3 narrowest = {1, 1, 1});
 
-// Contiguous parts of the cells of one direction, at least `narrowest` cells each, so that the dearest part is as cheap as can be;
-// of those that are, the one whose cuts are lowest. cost: of each cell, none negative.
+// Contiguous parts of the cells of one direction, at least `narrowest` cells each, so that the dearest part is as cheap as can
+// be; of those that are, the one whose cuts are lowest. cost: of each cell, none negative.
 std::vector<int> cheapest_cuts(const std::vector<double>& cost, int parts, int narrowest);
 
 class Decomposition {
@@ -35,11 +35,11 @@ class Decomposition {
   Int3 ranks() const { return ranks_; }  // blocks a direction
   Int3 place() const { return place_; }  // of this rank's block among them
   Int3 global_cells() const { return global_cells_; }
-  Int3 first() const { return first_; }                                                          // this block's first cell
-  Int3 cells() const { return cells_; }                                                          // this block's cells
+  Int3 first() const { return first_; }                                                // this block's first cell
+  Int3 cells() const { return cells_; }                                                // this block's cells
   int cells(int d, int place) const { return cuts_[d][place + 1] - cuts_[d][place]; }  // of the blocks at that place
-  Vec3 size() const { return size_; }                                                            // of the whole box, m
-  Vec3 low() const { return low_; }                                                              // this block's corners, m
+  Vec3 size() const { return size_; }                                                  // of the whole box, m
+  Vec3 low() const { return low_; }                                                    // this block's corners, m
   Vec3 high() const { return high_; }
   bool periodic(int d) const { return periodic_[d]; }
 

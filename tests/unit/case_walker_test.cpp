@@ -111,24 +111,17 @@ TEST(Schema, EveryNumberHasBounds) {
       const bool is_number = field->cpp_type() == FieldDescriptor::CPPTYPE_DOUBLE ||
                              field->cpp_type() == FieldDescriptor::CPPTYPE_UINT32 ||
                              field->message_type() == v1::Vector::descriptor();
-      if (!is_number || parameter.has_not_built_yet()) continue;
+      if (!is_number) continue;
       EXPECT_TRUE(parameter.has_min() && parameter.has_max()) << field->full_name();
     }
   });
 }
 
-TEST(Schema, ListsHoldMessagesAndARequiredChoiceHasABuiltArm) {
+TEST(Schema, ListsHoldMessages) {
   for_each_message([](const Descriptor* type) {
     for (int i = 0; i < type->field_count(); ++i) {
       if (!type->field(i)->is_repeated()) continue;
       EXPECT_NE(type->field(i)->message_type(), nullptr) << type->field(i)->full_name();
-    }
-    for (int i = 0; i < type->oneof_decl_count(); ++i) {
-      const auto* choice = type->oneof_decl(i);
-      if (!choice->options().GetExtension(v1::choice).required()) continue;
-      bool built = false;
-      for (int k = 0; k < choice->field_count(); ++k) built = built || !parameter_of(choice->field(k)).has_not_built_yet();
-      EXPECT_TRUE(built) << choice->full_name();
     }
   });
 }
@@ -177,7 +170,7 @@ TEST(CaseWalker, NotANumberAndInfinityAreRefusedEverywhere) {
   int tried = 0;
   for_each_field(value, "", nullptr,
                  [&](Message& message, const FieldDescriptor* field, const std::string& path, const v1::Parameter&) {
-                   if (field->cpp_type() != FieldDescriptor::CPPTYPE_DOUBLE || parameter_of(field).has_not_built_yet()) return;
+                   if (field->cpp_type() != FieldDescriptor::CPPTYPE_DOUBLE) return;
                    for (const double bad : {std::numeric_limits<double>::quiet_NaN(), -std::numeric_limits<double>::infinity()}) {
                      const Trial trial(message, field, bad);
                      EXPECT_THAT(check_case(value), has_fault(path, "finite"));
@@ -193,8 +186,7 @@ TEST(CaseWalker, ValueBeyondABoundIsRefusedWithValueUnitAndRange) {
   for_each_field(value, "", nullptr,
                  [&](Message& message, const FieldDescriptor* field, const std::string& path, const v1::Parameter& parameter) {
                    const bool is_double = field->cpp_type() == FieldDescriptor::CPPTYPE_DOUBLE;
-                   if ((!is_double && field->cpp_type() != FieldDescriptor::CPPTYPE_UINT32) || parameter.has_not_built_yet())
-                     return;
+                   if (!is_double && field->cpp_type() != FieldDescriptor::CPPTYPE_UINT32) return;
                    const std::string unit = parameter.unit() == "1" ? "" : parameter.unit();
                    const double size = std::max({1.0, std::abs(parameter.min()), std::abs(parameter.max())});
                    if (parameter.has_min() && (is_double || parameter.min() > 0)) {
@@ -256,28 +248,6 @@ TEST(CaseWalker, MissingChoiceNamesItsBuiltArms) {
   EXPECT_THAT(check_case(value),
               AllOf(has_fault("coupling.kernel", "; set one of hat, square_dpvm, garg, gaussian in coupling"),
                     has_fault("particles.tangential", "; set one of frictionless, coulomb, spring, mindlin in particles")));
-}
-
-TEST(CaseWalker, WhatIsNotBuiltYetIsRefusedWithItsSentenceAndAlone) {
-  v1::Case value = full_case();
-  int tried = 0;
-  for_each_field(value, "", nullptr,
-                 [&](Message& message, const FieldDescriptor* field, const std::string& path, const v1::Parameter&) {
-                   if (!parameter_of(field).has_not_built_yet()) return;
-                   const std::unique_ptr<Message> before(message.New());
-                   before->CopyFrom(message);
-                   if (field->message_type() != nullptr) {
-                     message.GetReflection()->MutableMessage(&message, field);
-                   } else {
-                     message.GetReflection()->SetDouble(&message, field, 1);
-                   }
-                   const auto faults = check_case(value);
-                   EXPECT_THAT(faults, has_fault(path, "not built yet: " + parameter_of(field).not_built_yet()));
-                   EXPECT_EQ(faults.size(), 1U) << path;
-                   message.CopyFrom(*before);
-                   ++tried;
-                 });
-  if (tried == 0) GTEST_SKIP() << "all that the schema has is built";
 }
 
 TEST(CaseWalker, NamesMustMatchTheirPattern) {

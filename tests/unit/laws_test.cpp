@@ -11,15 +11,12 @@
 namespace bedflow {
 namespace {
 
-// Names of the arms of a choice that are built.
+// Names of the arms of a choice.
 std::set<std::string> arms(const google::protobuf::Descriptor* message, const char* choice) {
   const google::protobuf::OneofDescriptor* oneof = message->FindOneofByName(choice);
   EXPECT_NE(oneof, nullptr) << choice;
   std::set<std::string> names;
-  for (int f = 0; oneof && f < oneof->field_count(); ++f) {
-    const v1::Parameter& parameter = oneof->field(f)->options().GetExtension(v1::parameter);
-    if (!parameter.has_not_built_yet()) names.insert(oneof->field(f)->name());
-  }
+  for (int f = 0; oneof && f < oneof->field_count(); ++f) names.insert(oneof->field(f)->name());
   return names;
 }
 

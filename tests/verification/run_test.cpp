@@ -139,7 +139,7 @@ TEST_F(JobRun, BlocksFollowTheParticlesAlsoOverAResume) {
     return nlohmann::json::parse(std::ifstream(job / "summary.json"))["block_moves"].get<int>();
   };
   if (comm.size() > 1) {
-    EXPECT_GT(moves(through), 1);  // at the start, and on the way
+    EXPECT_GT(moves(through), 1);                   // at the start, and on the way
     EXPECT_EQ(moves(stopped), moves(through) - 1);  // the start's was in its first attempt
   } else {
     EXPECT_EQ(moves(through), 0);
