@@ -61,6 +61,15 @@ struct CouplingScene {
   double fraction_floor = 0.35;
 };
 
+// Limits of a state beyond which the run stops (guard.h).
+struct GuardSetup {
+  double overlap = 0.3;     // of a contact, over the sum of the radii, at most
+  double move = 0.1;        // of a particle in a sub-step, over its diameter, at most
+  double gas_fraction = 0;  // of a cell, before the floor, at least
+  double courant = 100;     // at most
+  int retries = 0;          // from the last checkpoint, each with half the step
+};
+
 struct Scene {
   std::string name;
   Vec3 size;     // m
@@ -79,6 +88,7 @@ struct Scene {
   std::optional<double> courant;        // Σ|U|dt/h, at most
   std::vector<MonitorSetup> monitors;
   std::optional<double> plot_interval;  // s
+  GuardSetup guard;
 };
 
 }  // namespace bedflow

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "base/short_number.h"
-#include "grid/rows.h"
+#include "guard.h"
 
 namespace bedflow {
 
@@ -25,22 +25,6 @@ DemSetup dem_setup(const Plan& plan) {
                            plan.scene.coupling->scheme);
   }
   return setup;
-}
-
-// The largest Σ|u|/h of a cell, 1/s.
-double fastest_transport(const Grid& grid, const FaceField& velocity) {
-  double fastest = 0;
-  for_rows(grid, [&](auto first, int n) {
-    for (auto c = first; c < first + n; ++c) {
-      double rate = 0;
-      for (int d = 0; d < 3; ++d) {
-        const double* u = velocity[d].data();
-        rate += std::max(std::abs(u[c]), std::abs(u[c + grid.stride(d)])) / grid.spacing[d];
-      }
-      fastest = std::max(fastest, rate);
-    }
-  });
-  return fastest;
 }
 
 }  // namespace
@@ -100,12 +84,20 @@ void Simulation::step() {
   if (dem_) turn_over_particles(dt);  // some have entered, some have left
   last_step_ = dt;
   ++steps_;
+  watch(dt);  // is it still a bed?
+}
+
+void Simulation::watch(double dt) {
+  const GuardSetup& limits = plan_.scene.guard;
+  if (coupling_) watch_fraction(limits, gas_->grid, coupling_->transfer.lowest(), failure_);
+  if (gas_) watch_gas(limits, gas_->grid, gas_->state.velocity, dt, failure_);
+  if (dem_) watch_particles(limits, *dem_, max_overlap_, dt / last_substeps_, failure_);
 }
 
 void Simulation::deposit_volume() {
   GasState& gas = gas_->state;
   std::swap(coupling_->fraction_before, gas.fraction);
-  hidden_solids_ = coupling_->transfer.deposit_volume(dem_->particles(), gas.fraction);
+  coupling_->transfer.deposit_volume(dem_->particles(), gas.fraction);
   if (!plan_.scene.coupling->displacement || last_step_ == 0) return;
   const double rate = 1 / last_step_;  // the time in which the particles moved
   for (std::size_t c = 0; c < gas.fraction.size(); ++c) {
@@ -199,8 +191,7 @@ bool Simulation::finished() const {
 }
 
 const Failure& Simulation::failure() const {
-  static const Failure none;
-  return dem_ ? dem_->failure() : none;
+  return dem_ && dem_->failure() ? dem_->failure() : failure_;
 }
 
 std::vector<std::string> Simulation::take_notes() {
@@ -223,7 +214,7 @@ void Simulation::seed() {
     turnover_.initial = present();
     particle_count_ = turnover_.initial.count;
   }
-  if (coupling_) hidden_solids_ = coupling_->transfer.deposit_volume(dem_->particles(), gas_->state.fraction);
+  if (coupling_) coupling_->transfer.deposit_volume(dem_->particles(), gas_->state.fraction);
 }
 
 bool Simulation::settle() {
@@ -242,7 +233,7 @@ bool Simulation::settle() {
   const double energy = decomposition_.comm().sum(dem_->kinetic_energy());
   const double speed = std::sqrt(2 * energy / turnover_.initial.mass);
   if (settled_time_ < settling.duration && (settled_time_ < plan_.fall_time || speed > settling.rest_velocity)) return true;
-  if (coupling_) hidden_solids_ = coupling_->transfer.deposit_volume(dem_->particles(), gas_->state.fraction);
+  if (coupling_) coupling_->transfer.deposit_volume(dem_->particles(), gas_->state.fraction);
   for (GasResponse& response : dem_->particles().gas_response) response = {};  // no gas has been felt
   return false;
 }

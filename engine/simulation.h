@@ -94,6 +94,7 @@ class Simulation {
   void note(const std::string& change);
   void advance_particles(double dt);
   void turn_over_particles(double dt);
+  void watch(double dt);
   Amount amount_here() const;
   Amount present() const;
   void audit_exchange();
@@ -116,7 +117,6 @@ class Simulation {
   int last_substeps_ = 0;
   StepController controller_;
   double time_ = 0, last_step_ = 0, settled_time_ = 0;
-  double hidden_solids_ = 0;  // m³ cut by the floor of ε in the last step
   double max_overlap_ = 0;
   std::vector<WallLoad> wall_loads_;  // of the last step
   bool audit_exchange_ = false;       // a monitor asks for it
@@ -124,6 +124,7 @@ class Simulation {
   std::int64_t particle_count_ = 0, next_id_ = 0;
   Turnover turnover_;
   GasOutcome gas_outcome_;
+  Failure failure_;  // that the guard has found
   std::vector<std::string> notes_;
 };
 

@@ -100,17 +100,19 @@ double Transfer::deposit_volume(const ParticleStore& particles, Field& fraction)
 
   double hidden = 0;
   const double floor = setup_.fraction_floor;
+  lowest_ = {};
   lattices_.each_owned_row(cell_centres, [&](Int3 first, int n) {
     double* row = &fraction(first[0], first[1], first[2]);
     for (int i = 0; i < n; ++i) {
       const double value = 1 - row[i];
       row[i] = std::max(value, floor);
       hidden += row[i] - value;
+      if (!(value >= lowest_.fraction)) lowest_ = {value, {first[0] + i, first[1], first[2]}};
     }
   });
   halo_.fill(fraction);
   mirror_at_faces(fraction);
-  return decomposition_.comm().sum(hidden * grid_.cell_volume());
+  return hidden * grid_.cell_volume();
 }
 
 // x, y, z in turn, so that edges and corners follow.

@@ -56,8 +56,15 @@ class Transfer {
  public:
   Transfer(const Decomposition& decomposition, const Grid& grid, Halo& halo, const TransferSetup& setup, PhaseTimer& timer);
 
-  // ε at cell centres, ghosts and the cells beyond walls too. Returns the solids volume (m³, all ranks) that the floor hid.
+  // ε at cell centres, ghosts and the cells beyond walls too. Returns the solids volume (m³, this rank) that the floor hid.
   double deposit_volume(const ParticleStore& particles, Field& fraction);
+
+  // Of the last deposit the smallest ε of a cell of this block, before the floor, and where it is.
+  struct Lowest {
+    double fraction = 1;
+    Int3 cell{};
+  };
+  const Lowest& lowest() const { return lowest_; }
 
   // Beyond a face of the box a centre field is what it is in the cell inside.
   void mirror_at_faces(Field& field) const;
@@ -114,6 +121,7 @@ class Transfer {
   }
 
   const Decomposition& decomposition_;
+  Lowest lowest_;
   const Grid& grid_;
   Halo& halo_;
   TransferSetup setup_;

@@ -64,6 +64,14 @@ class Dem {
   void set_tuning(const Tuning& tuning);               // before restore()
   std::int64_t rebuilds() const { return rebuilds_; }  // of the pair list since construction
   std::vector<int> listed_pairs() const;               // of each owned particle
+  // The contact of this rank that overlaps most at the places the particles have now.
+  struct DeepContact {
+    double overlap = 0;        // over the sum of the radii, on a face of the box over the diameter; 0: there is none
+    std::int64_t first = 0;    // ids
+    std::int64_t second = -1;  // -1: a face of the box
+    Vec3 place;                // of the first, m
+  };
+  DeepContact deepest_contact() const;
   // PARTICLE_LOST (id, place), DIVERGED (not finite, or further than its diameter in one sub-step): noted on this rank, to be
   // voted on.
   const Failure& failure() const { return failure_; }

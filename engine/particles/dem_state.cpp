@@ -98,6 +98,25 @@ std::vector<int> Dem::listed_pairs() const {
   return count;
 }
 
+Dem::DeepContact Dem::deepest_contact() const {
+  DeepContact found;
+  const auto radius = [&](std::size_t row) { return radius_of(setup_.types, particles_, row); };
+  const auto place = [&](std::size_t row) {
+    return particles_.position(row) + (row < particles_.owned ? Vec3{} : ghosts_.shifts()[row - particles_.owned]);
+  };
+  for (std::size_t p = 0; p < list_.count(); ++p) {
+    const auto [i, j] = list_.pairs[p];
+    const double sum = radius(i) + radius(j), overlap = 1 - norm(place(j) - place(i)) / sum;
+    if (overlap > found.overlap) found = {overlap, particles_.id[i], particles_.id[j], place(i)};
+  }
+  for (const auto [i, face] : list_.near) {
+    if (setup_.sides[face / 2][face % 2] != Side::wall) continue;
+    const double overlap = (1 - faces_[face].distance(place(i)) / radius(i)) / 2;
+    if (overlap > found.overlap) found = {overlap, particles_.id[i], -1, place(i)};
+  }
+  return found;
+}
+
 double Dem::take_max_overlap() {
   return std::exchange(deepest_, 0);
 }

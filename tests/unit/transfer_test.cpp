@@ -134,10 +134,18 @@ TEST(Transfer, WhatTheFloorHidesIsCounted) {
   const Vec3 place{0.5, 1, 0.7};
   for (int p = 0; p < 300; ++p)
     if (bed.decomposition.owner(place) == bed.decomposition.comm().rank()) heap.add(p, place, {}, {});
-  const double hidden = bed.transfer.deposit_volume(heap, bed.gas.fraction);
+  const double hidden = bed.decomposition.comm().sum(bed.transfer.deposit_volume(heap, bed.gas.fraction));
   double solids = 0;
   bed.each_cell([&](int i, int j, int k) { solids += (1 - bed.gas.fraction(i, j, k)) * bed.grid.cell_volume(); });
   EXPECT_GT(hidden, 0);
+  const Transfer::Lowest lowest = bed.transfer.lowest();  // before the floor: the heap fills its cell many times over
+  const double smallest = bed.decomposition.comm().min(lowest.fraction);
+  EXPECT_LT(smallest, -1);
+  if (lowest.fraction == smallest) {
+    EXPECT_EQ(bed.grid.first[0] + lowest.cell[0], bed.decomposition.cell_of(0, place.x));
+    EXPECT_EQ(bed.grid.first[1] + lowest.cell[1], bed.decomposition.cell_of(1, place.y));
+    EXPECT_EQ(bed.grid.first[2] + lowest.cell[2], bed.decomposition.cell_of(2, place.z));
+  }
   EXPECT_NEAR((bed.decomposition.comm().sum(solids) + hidden) / (300 * Bed::volume), 1, 1e-13);
 }
 
