@@ -87,7 +87,11 @@ class CostModel(unittest.TestCase):
     def test_a_message_costs_latency_and_its_bytes(self):
         ghosts = self.model.ghosts((0.1, 0.1), (1, 0))
         _, talk = self.model.time(2, (0.1, 0.1), (1, 0), 1, self.network)
-        self.assertAlmostEqual(talk, 1e-6 + 1e-6 + 72 * ghosts / 1e9)
+        self.assertAlmostEqual(talk, 1e-6 + 72 * ghosts / 1e9, places=9)
+
+    def test_a_reduction_counts_where_it_takes_longer_than_the_messages(self):
+        _, talk = self.model.time(1024, (0.1, 0.1), (1, 0), 1, {**self.network, "reduction": 1e-3})
+        self.assertAlmostEqual(talk, 10 * 1e-3, places=9)
 
     def test_efficiency_begins_at_one_falls_and_ends_where_a_column_is_narrower_than_the_reach(self):
         of = [figure.value for figure in scaling.predictions(self.model, "strong", lambda ranks: 1e5, 1)]
