@@ -30,6 +30,9 @@ constexpr double projection_cell_seconds = 0.21e-6;
 // no more than the few of a multigrid (tests/performance/bench_gas.cpp); the projection goes to a millionth.
 constexpr std::int64_t smallest_multigrid = 20000;
 
+constexpr double widest_skin =
+    0.8;  // of a cell: half of it a particle may be outside its block, where the halo must know the gas
+
 // The largest superficial velocity that any inflow or held flux of the scene reaches, m/s.
 double fastest_inflow(const GasScene& gas) {
   double fastest = 0;
@@ -127,6 +130,7 @@ void plan_space(Plan& plan) {
     plan.skin = plan.tuned_skin ? 0.25 * scene.particles->largest() : scene.particles->skin;
     if (scene.coupling) {
       const Vec3 spacing{scene.size.x / scene.cells[0], scene.size.y / scene.cells[1], scene.size.z / scene.cells[2]};
+      if (plan.tuned_skin) plan.skin = std::min(plan.skin, widest_skin * std::min({spacing.x, spacing.y, spacing.z}));
       plan.ghosts =
           std::max(plan.ghosts, kernel_ghosts(scene.coupling->kernel, scene.particles->largest(), spacing, plan.skin, shared));
     }
@@ -140,7 +144,7 @@ void plan_space(Plan& plan) {
                    "domain.size: " + short_number(scene.size[d]) + " m in a periodic direction is less than twice the " +
                        "reach of the particles (largest diameter + attraction + skin = " + short_number(reach) + " m)");
       }
-      if (scene.gas && plan.skin / 2 > 0.4 * cell) {
+      if (scene.gas && plan.skin > widest_skin * cell) {
         throw Stop(Reason::invalid_case, "particles.skin = " + short_number(plan.skin) + " m is too wide for cells of " +
                                              short_number(cell) + " m (domain.cells): at most 0.8 of a cell");
       }
@@ -252,6 +256,12 @@ void plan_parts(Plan& plan) {
     const bool rotation = scene.particles->laws.rotation(), history = scene.particles->laws.history();
     add("rotation", rotation, rotation ? "the tangential law turns the particles" : "without friction nothing turns them");
     add("contact history", history, history ? "the tangential spring remembers" : "the tangential law has no memory");
+    const ContactLaws& laws = scene.particles->laws;
+    add("rolling resistance", laws.rolls(), laws.rolls() ? "the case names a rolling law" : "the case names none");
+    const double range = laws.range();
+    add("attraction", range > 0, range > 0 ? "over gaps up to " + short_number(range) + " m" : "the case names none");
+    add("velocity Verlet", scene.particles->verlet,
+        scene.particles->verlet ? "the case says so" : "symplectic Euler, first order in dt, one force a sub-step");
     add_sizes(plan);
     add("walls within the box", !scene.walls.empty(), scene.walls.empty() ? "the case has none" : walls_text(scene.walls));
     const bool settling = scene.particles->settling.has_value();

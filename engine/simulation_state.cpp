@@ -1,4 +1,5 @@
 // The simulation's state to and from a checkpoint.
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <set>
@@ -69,6 +70,9 @@ std::optional<Cuts> Simulation::blocks_of(const CheckpointSource& from, const Co
   if (from.ranks() != comm.size() || !from.has("blocks")) return {};
   const std::vector<std::int64_t> mine = from.integer_rows("blocks");
   const std::vector<double> all = comm.gather_all(std::vector<double>(mine.begin(), mine.end()));
+  constexpr double most_cells = 1e9;  // the file may come from anywhere
+  const auto plausible = [](double cell) { return cell >= 0 && cell <= most_cells; };
+  if (all.size() != 6 * static_cast<std::size_t>(comm.size()) || !std::ranges::all_of(all, plausible)) return {};
   std::array<std::set<int>, 3> cuts;
   for (std::size_t r = 0; r < all.size(); r += 6)
     for (std::size_t d = 0; d < 3; ++d) {
