@@ -199,5 +199,32 @@ std::vector<Extreme> extremes() {
 }
 INSTANTIATE_TEST_SUITE_P(Of, Extremes, testing::ValuesIn(extremes()), [](const auto& scene) { return scene.param.name; });
 
+// Implicit convection has no limit: a channel that is fed at one half of its floor stays bounded at every Courant number.
+TEST(Limits, OfImplicitConvectionAreNone) {
+  for (const char* solver : {"simple {} upwind {}", "projection {} smart {}"}) {
+    for (const double courant : {0.5, 5.0, 50.0}) {
+      const double speed = 1, cell = 0.005;
+      const std::string text =
+          R"(name: "jet" domain { size { x: 0.04 y: 0.08 z: 0.02 } cells { x: 8 y: 16 z: 4 } faces { y_high { outflow {} }
+            y_low { inflow { velocity: 0 patches { low { x: 0 y: 0 } high { x: 0.02 y: 0.02 z: 0.02 } velocity: 1 } } } } } gravity {}
+            gas { density: 1.2 viscosity: 1.8e-5 )" +
+          std::string(solver) + " } guard { courant: 1e6 } time { end: 100 step: " + std::to_string(courant * cell / speed) +
+          " }";
+      const Comm self = Comm::self();
+      PhaseTimer timer;
+      Simulation simulation(make_plan(scene_of(self, text), 1), self, timer);
+      simulation.seed();
+      double fastest = 0;
+      for (int step = 0; step < 40; ++step) {
+        simulation.step();
+        for (const Vec3 u : simulation.gas_plot().velocity) fastest = std::max(fastest, norm(u));
+      }
+      std::printf("  %-44s Courant number %-13.3g bounded by %.3f of the jet's speed\n", solver, courant, fastest / speed);
+      EXPECT_FALSE(simulation.failure());
+      EXPECT_LT(fastest, 1.5 * speed);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace bedflow
