@@ -2,7 +2,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cstring>
+#include <map>
 #include <memory>
 
 #include "balance.h"
@@ -158,6 +160,19 @@ std::unique_ptr<Simulation> moved(const Simulation& from, const Plan& plan, cons
   return result;
 }
 
+// What all contacts between particles remember, by the ids.
+std::map<std::pair<double, double>, std::array<double, 3>> memories(const Simulation& simulation, const Comm& comm) {
+  std::vector<double> rows;
+  for (const PairHistory& pair : simulation.particles()->pair_histories()) {
+    const Vec3 xi = pair.memory.displacement;
+    rows.insert(rows.end(), {static_cast<double>(pair.low), static_cast<double>(pair.high), xi.x, xi.y, xi.z});
+  }
+  rows = comm.gather_all(rows);
+  std::map<std::pair<double, double>, std::array<double, 3>> result;
+  for (std::size_t r = 0; r < rows.size(); r += 5) result[{rows[r], rows[r + 1]}] = {rows[r + 2], rows[r + 3], rows[r + 4]};
+  return result;
+}
+
 // Particles of the fullest rank over the ranks' mean.
 double fullest(const Simulation& simulation, const Comm& comm) {
   const auto owned = static_cast<std::int64_t>(simulation.particles()->particles().owned);
@@ -181,6 +196,8 @@ TEST(Blocks, MovedToWhereTheWorkIsLeaveTheStateAsItIs) {
 
   const Found before = found(stays, world), after = found(*goes, world);
   EXPECT_EQ(before.position, after.position);
+  EXPECT_FALSE(memories(stays, world).empty());
+  EXPECT_EQ(memories(*goes, world), memories(stays, world));
   EXPECT_NEAR(after.kinetic / before.kinetic, 1, 1e-14);
   EXPECT_NEAR(after.fraction / before.fraction, 1, 1e-14);  // summed in another order
   EXPECT_NEAR(after.pressure / before.pressure, 1, 1e-14);
