@@ -246,11 +246,11 @@ void import_checkpoint(const fs::path& file, const fs::path& folder) {
   const auto* text = found == content.arrays.end() ? nullptr : std::get_if<std::string>(&found->values);
   constexpr std::size_t longest_case = 4 << 20;
   if (!text || text->size() > longest_case) refuse("it carries no case");
+  const Scene scene = scene_of(*text);  // of the text alone: no files that it may name
+  Fit(content, scene).check();
   const fs::path case_file = folder / "case.txtpb";
   if (!(std::ofstream(case_file, std::ios::binary) << *text).flush())
     throw Stop(Reason::disk_full, "cannot write " + case_file.string());
-  const Scene scene = read_scene(case_file);
-  Fit(content, scene).check();
   write_checkpoint(Comm::self(), folder / "checkpoints", content, 2);
 }
 

@@ -100,7 +100,7 @@ JobService::Unary* JobService::answer(Context* context, Pace pace, std::function
   last_call_ = std::chrono::steady_clock::now();
   ++calls_;
   Unary* reactor = context->DefaultReactor();
-  boost::asio::post(pace == Pace::quick ? quick_ : slow_, [this, reactor, call = std::move(call)] {
+  boost::asio::post(pool(pace), [this, reactor, call = std::move(call)] {
     grpc::Status status;
     try {
       call();
@@ -116,6 +116,7 @@ JobService::Unary* JobService::answer(Context* context, Pace pace, std::function
 void JobService::wait_for_calls() {
   quick_.join();
   slow_.join();
+  reading_.join();
 }
 
 std::chrono::steady_clock::duration JobService::quiet() const {
@@ -174,13 +175,13 @@ JobService::Unary* JobService::DeleteJob(Context* context, const v1::DeleteJobRe
 
 JobService::Unary* JobService::GetCheckpoint(Context* context, const v1::GetCheckpointRequest* request,
                                              v1::Checkpoint* response) {
-  return answer(context, Pace::slow,
+  return answer(context, Pace::reading,
                 [=, this] { *response = get_checkpoint(readers_, jobs_.folder(request->name().job()), request->name()); });
 }
 
 JobService::Unary* JobService::VerifyCheckpoint(Context* context, const v1::VerifyCheckpointRequest* request,
                                                 v1::VerifyCheckpointResponse* response) {
-  return answer(context, Pace::slow,
+  return answer(context, Pace::reading,
                 [=, this] { *response = verify_checkpoint(readers_, jobs_.folder(request->name().job()), request->name()); });
 }
 
@@ -202,7 +203,7 @@ JobService::Unary* JobService::CreateCheckpoint(Context* context, const v1::Crea
 }
 
 JobService::Unary* JobService::GetSnapshot(Context* context, const v1::GetSnapshotRequest* request, v1::Snapshot* response) {
-  return answer(context, Pace::slow, [=, this] { *response = snapshot(engine_, jobs_.folder(request->id()), *request); });
+  return answer(context, Pace::reading, [=, this] { *response = snapshot(engine_, jobs_.folder(request->id()), *request); });
 }
 
 JobService::Unary* JobService::GetServerInfo(Context* context, const v1::GetServerInfoRequest*, v1::ServerInfo* response) {

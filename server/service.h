@@ -37,11 +37,12 @@ class JobService final : public v1::JobService::CallbackService {
  private:
   using Context = grpc::CallbackServerContext;
   using Unary = grpc::ServerUnaryReactor;
-  enum class Pace { quick, slow };  // slow: asks the engine, or waits for it
+  enum class Pace { quick, slow, reading };  // slow: asks the engine, or waits for it; reading: asks a reader of checkpoints
 
   Unary* answer(Context* context, Pace pace, std::function<void()> call);
   template <class Response, class Source>
-  grpc::ServerWriteReactor<Response>* stream(Context* context, Source source);
+  grpc::ServerWriteReactor<Response>* stream(Context* context, Pace pace, Source source);
+  boost::asio::thread_pool& pool(Pace pace) { return pace == Pace::quick ? quick_ : pace == Pace::slow ? slow_ : reading_; }
 
   Unary* CreateJob(Context*, const v1::CreateJobRequest*, v1::CreateJobResponse*) override;
   Unary* GetJob(Context*, const v1::GetJobRequest*, v1::Job*) override;
@@ -76,6 +77,7 @@ class JobService final : public v1::JobService::CallbackService {
   std::atomic<bool> draining_ = false;
   boost::asio::thread_pool quick_{4};
   boost::asio::thread_pool slow_{16};
+  boost::asio::thread_pool reading_{10};  // as many as may read, and two that wait for a place
 };
 
 }  // namespace bedflow::server

@@ -9,10 +9,10 @@
 namespace bedflow::server {
 
 template <class Response, class Source>
-grpc::ServerWriteReactor<Response>* JobService::stream(Context* context, Source source) {
+grpc::ServerWriteReactor<Response>* JobService::stream(Context* context, Pace pace, Source source) {
   last_call_ = std::chrono::steady_clock::now();
   ++calls_;
-  return PullStream<Response>::open(slow_, context, std::move(source), status_of_failure, [this] {
+  return PullStream<Response>::open(pool(pace), context, std::move(source), status_of_failure, [this] {
     last_call_ = std::chrono::steady_clock::now();
     --calls_;
   });
@@ -26,7 +26,7 @@ grpc::ServerWriteReactor<v1::StreamStatisticsResponse>* JobService::StreamStatis
     Clock::time_point last{};
   };
   return stream<v1::StreamStatisticsResponse>(
-      context, [this, request = *request, state = std::make_shared<State>()](v1::StreamStatisticsResponse& response) {
+      context, Pace::slow, [this, request = *request, state = std::make_shared<State>()](v1::StreamStatisticsResponse& response) {
         constexpr auto longest_silence = std::chrono::seconds(10);
         if (draining_) {
           throw Refusal(Refused::going_down, "the server is going down, the job is not; ask again with after_record");
@@ -47,7 +47,8 @@ grpc::ServerWriteReactor<v1::StreamStatisticsResponse>* JobService::StreamStatis
 grpc::ServerWriteReactor<v1::DownloadCheckpointResponse>* JobService::DownloadCheckpoint(
     Context* context, const v1::DownloadCheckpointRequest* request) {
   return stream<v1::DownloadCheckpointResponse>(
-      context, [this, request = *request, file = std::shared_ptr<Download>()](v1::DownloadCheckpointResponse& part) mutable {
+      context, Pace::slow,
+      [this, request = *request, file = std::shared_ptr<Download>()](v1::DownloadCheckpointResponse& part) mutable {
         if (!file) file = std::make_shared<Download>(jobs_.folder(request.name().job()), request);
         return file->next(part) ? Pulled::answer : Pulled::end;
       });
@@ -76,7 +77,8 @@ grpc::ServerWriteReactor<v1::FieldAnswer>* JobService::QueryField(Context* conte
     return answering;
   };
   return stream<v1::FieldAnswer>(
-      context, [begin, request = *request, answering = std::shared_ptr<Readers::Answering>()](v1::FieldAnswer& part) mutable {
+      context, Pace::reading,
+      [begin, request = *request, answering = std::shared_ptr<Readers::Answering>()](v1::FieldAnswer& part) mutable {
         if (!answering) {
           answering = begin(request, part);
           return Pulled::answer;

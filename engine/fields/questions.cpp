@@ -35,7 +35,8 @@ Region region_of(const FieldSource& source, const Question& question) {
   return region;
 }
 
-std::vector<Quantity> quantities_of(const FieldSource& source, const Question& question, std::vector<std::string> otherwise) {
+std::vector<Quantity> quantities_of(const FieldSource& source, const Question& question,
+                                    const std::vector<std::string>& otherwise) {
   std::vector<Quantity> list;
   for (const std::string& name : question.quantities.empty() ? otherwise : question.quantities)
     list.push_back(source.quantity(name));

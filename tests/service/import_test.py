@@ -90,8 +90,9 @@ class Hostile(unittest.TestCase):
         with self.assertRaises(bedflow.Error) as caught:
             connection.import_checkpoint(self.file)
         self.assertEqual(caught.exception.reason, reason, caught.exception)
+        self.last = str(caught.exception)
         for text in texts:
-            self.assertIn(text, str(caught.exception))
+            self.assertIn(text, self.last)
 
     def change(self, name, change):
         with h5py.File(self.file, "r+") as file:
@@ -213,6 +214,10 @@ class Hostile(unittest.TestCase):
         self.refused("INVALID_CASE", "restitution")
         write(b"domain{" * 1000)
         self.refused("INVALID_CASE")
+        seeding = case[case.index(b"random {"):case.index(b"symplectic_euler")]
+        write(case.replace(seeding, b'placed { file: "/etc/passwd" }'.ljust(len(seeding))))
+        self.refused("INVALID_CASE", "particles.placed.file")
+        self.assertNotIn("line 1", self.last)  # the table was not opened
 
     def test_numbers_of_another_bed(self):
         for name, value, reason in (("particles/count", 499.0, "INVALID_CASE"), ("domain/size_y", 1.0, "INVALID_CASE"),
