@@ -36,8 +36,8 @@ struct CheckpointArray {
   std::vector<std::int64_t> rank_offsets = {};
 };
 
-// An array as it lies in a file. Grid arrays have the shape (z, y, x), row arrays (rows, columns) or (rows), text arrays (bytes). A
-// row array is followed by "rank_offsets/<name>": the first row of each rank, and the number of all rows.
+// An array as it lies in a file. Grid arrays have the shape (z, y, x), row arrays (rows, columns) or (rows), text arrays (bytes).
+// A row array is followed by "rank_offsets/<name>": the first row of each rank, and the number of all rows.
 struct Dataset {
   enum class Type { real, integer, byte };
   std::string name, unit, meaning;
