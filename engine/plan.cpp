@@ -171,7 +171,7 @@ void plan_cost(Plan& plan) {
   const auto particles = static_cast<double>(plan.particle_count + plan.entering);  // at most: some leave
   // Fields of gas, exchange and pressure solver; arrays and pair list of the particles (about 8 pairs within reach of each).
   const double field = cells > 0 ? cells * sizeof(double) : 0;
-  plan.memory_bytes = 40e6 * plan.ranks + field * (scene.coupling ? 90 : 80) +
+  plan.memory_bytes = 40e6 * plan.ranks + field * (scene.coupling ? 72 : 38) +
                       particles * (24.0 * (rotation ? 8 : 5) + 16 + 8 * (4 + (history ? 25 : 0)));
   plan.checkpoint_bytes = 100e3 + field * 5 + particles * (8 + 24.0 * (rotation ? 4 : 3) + (history ? 3 * 40 : 0));
   const auto steps = static_cast<double>(plan.steps);

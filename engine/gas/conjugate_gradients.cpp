@@ -12,14 +12,14 @@ constexpr int most_iterations = 2000;
 }  // namespace
 
 ConjugateGradients::ConjugateGradients(const Decomposition& decomposition, const Grid& grid, Halo& halo,
-                                       Preconditioner preconditioner)
+                                       Preconditioner preconditioner, Workspace& work)
     : decomposition_(decomposition),
       grid_(grid),
       halo_(halo),
       preconditioner_(Identity{}),
-      preconditioned_(grid),
-      direction_(grid),
-      product_(grid),
+      preconditioned_(work[0]),
+      direction_(work[1]),
+      product_(work[2]),
       row_sum_(grid.cells[0]) {
   if (preconditioner == Preconditioner::multigrid) preconditioner_.emplace<Multigrid>(decomposition, grid);
   if (preconditioner == Preconditioner::incomplete_cholesky) preconditioner_.emplace<IncompleteCholesky>(grid);
@@ -86,6 +86,7 @@ ConjugateGradients::Result ConjugateGradients::solve(const SevenPoint& matrix, b
   const double *z = preconditioned_.data(), *q = product_.data();
   solution.fill(0);
   direction_.fill(0);
+  preconditioned_.fill(0);
   if (singular) subtract_mean(b);
   double squares = dot(b, b), last = 0;
   target = std::max(target, reduction * reduction * squares);

@@ -8,6 +8,7 @@
 
 #include "gas/incomplete_cholesky.h"
 #include "gas/multigrid.h"
+#include "gas/workspace.h"
 #include "grid/halo.h"
 #include "grid/rows.h"
 
@@ -22,7 +23,8 @@ constexpr const char* name(Preconditioner preconditioner) {  // as in the schema
 
 class ConjugateGradients {
  public:
-  ConjugateGradients(const Decomposition& decomposition, const Grid& grid, Halo& halo, Preconditioner preconditioner);
+  ConjugateGradients(const Decomposition& decomposition, const Grid& grid, Halo& halo, Preconditioner preconditioner,
+                     Workspace& work);
 
   // What the preconditioner needs of a new matrix. Collective.
   void factor(const SevenPoint& matrix);
@@ -31,7 +33,7 @@ class ConjugateGradients {
     bool reached = false;
   };
   // A x = b from x = 0 until Σ(b − A x)² over all ranks has come down to `target`, or to the square of `reduction` times what it
-  // was; b becomes the residual b − A x. x has no ghosts. Collective.
+  // was; b becomes the residual b − A x. x has no ghosts. Neither is one of the workspace's first three. Collective.
   Result solve(const SevenPoint& matrix, bool singular, Field& b, Field& x, double reduction, double target);
 
  private:
@@ -46,7 +48,7 @@ class ConjugateGradients {
   const Grid& grid_;
   Halo& halo_;
   std::variant<Multigrid, IncompleteCholesky, Identity> preconditioner_;
-  Field preconditioned_, direction_, product_;
+  Field &preconditioned_, &direction_, &product_;
   RowSum row_sum_;
 };
 

@@ -15,23 +15,25 @@ void DrivenFlow::set_time(GasState& state, double time) {
   }
 }
 
-void DrivenFlow::steer(GasState& state, const FaceField& fraction, const FaceField& mobility) {
+void DrivenFlow::steer(GasState& state, const FaceField& conductance) {
   const double faces = static_cast<double>(grid_.global[0]) * grid_.global[1] * grid_.global[2];
   for (int d = 0; d < 3; ++d) {
     if (!wanted_[d]) continue;
-    const double *epsilon = fraction[d].data(), *push = mobility[d].data(), h = grid_.spacing[d];
+    const double *epsilon = state.fraction.data(), *through = conductance[d].data();
+    const double response_of = grid_.spacing[d] / grid_.face_area(d);
+    const std::ptrdiff_t s = grid_.stride(d);
     double *u = state.velocity[d].data(), *flow = row_sums_[0].clear(), *response = row_sums_[1].clear();
     for_rows(grid_, [=](auto c, int n) {
       for (int i = 0; i < n; ++i) {
-        flow[i] += epsilon[c + i] * u[c + i];
-        response[i] += epsilon[c + i] * push[c + i] * h;
+        flow[i] += 0.5 * (epsilon[c + i - s] + epsilon[c + i]) * u[c + i];
+        response[i] += response_of * through[c + i];
       }
     });
     std::array<double, 2> sums{row_sums_[0].total(), row_sums_[1].total()};
     decomposition_.comm().sum(sums);
     const double shift = *wanted_[d] - sums[0] / faces;
     for_rows(grid_, [=](auto c, int n) {
-      for (auto i = c; i < c + n; ++i) u[i] += shift / epsilon[i];
+      for (auto i = c; i < c + n; ++i) u[i] += shift / (0.5 * (epsilon[i - s] + epsilon[i]));
     });
     if (sums[1] > 0) state.fall[d] += shift * faces / sums[1];
   }

@@ -16,8 +16,8 @@ class DrivenFlow {
 
   // Given falls and wanted fluxes are those of a time (s).
   void set_time(GasState& state, double time);
-  // Collective. mobility: m/s/Pa of a face (Momentum). Ghosts of the velocity are then out of date.
-  void steer(GasState& state, const FaceField& fraction, const FaceField& mobility);
+  // Collective. conductance: ε A D of a face (PressureCorrection), m³/s/Pa. Ghosts of the velocity are then out of date.
+  void steer(GasState& state, const FaceField& conductance);
 
  private:
   const Decomposition& decomposition_;

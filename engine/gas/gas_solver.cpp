@@ -1,5 +1,6 @@
 #include "gas/gas_solver.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -27,15 +28,18 @@ GasStep::GasStep(const Decomposition& given_decomposition, const Grid& given_gri
       timer(given_timer),
       boundaries(decomposition, grid, setup.faces),
       panels(grid, decomposition, boundaries, setup.panels),
-      momentum(decomposition, grid, halo, setup, boundaries, panels),
+      work(grid),
+      pressure(decomposition, grid, halo, boundaries, setup.preconditioner, work),
+      momentum(decomposition, grid, halo, setup, boundaries, panels, work, pressure.mobility()),
       driven(decomposition, grid, setup),
-      pressure(decomposition, grid, halo, boundaries, setup.preconditioner),
       old_velocity(grid),
       old_pressure(grid) {}
 
 void GasStep::set_boundaries(GasState& state, double time, bool pressure_on_face) {
-  boundaries.continue_field(state.fraction);
-  halo.fill(state.fraction);
+  for (Field* field : {&state.fraction, &state.fraction_rate}) {
+    boundaries.continue_field(*field);
+    halo.fill(*field);
+  }
   boundaries.set_normal_velocity(state.velocity, state.fraction, time);
   panels.close(state.velocity);
   driven.set_time(state, time);
@@ -88,39 +92,52 @@ std::string GasStep::closed_box_fault(double dt) const {
               " m3/s, growth of the gas volume (d eps/dt) ", balance.storage, " m3/s; make one face an outflow");
 }
 
-std::string GasStep::begin(const GasState& state, const Exchange* exchange, double dt) {
-  const PhaseTimer::Scope scope(timer, Phase::momentum);
-  const bool sound = momentum.begin(state, old_velocity, exchange, dt);
-  if (!decomposition.comm().any(!sound)) return {};
-  return "the gas fraction at the step's start, or the gas share of the pressure force (1 - buoyancy), is not positive in some "
-         "cell";
-}
-
-Momentum::Sums GasStep::assemble(const GasState& state) {
-  const PhaseTimer::Scope scope(timer, Phase::momentum, static_cast<std::uint64_t>(grid.interior()));
-  Momentum::Sums all = momentum.assemble(state);
-  std::array<double, 3> sums{all.imbalance, all.force, all.throughput};
+// Assembles a component and adds its sums; coupling becomes its own. Returns a fault. Collective.
+std::string GasStep::add_component(int d, const GasState& state, const Momentum::Given& given, Momentum::Sums& all,
+                                   double& coupling) {
+  const Momentum::Sums one = momentum.assemble(d, state, given);
+  std::array<double, 4> sums{one.imbalance, one.force, one.throughput, one.unsound};
   decomposition.comm().sum(sums);
-  all.coupling = decomposition.comm().max(all.coupling);
-  all.imbalance = sums[0];
-  all.force = sums[1];
-  all.throughput = sums[2] + displacement;
-  return all;
+  coupling = decomposition.comm().max(one.coupling);
+  all.imbalance += sums[0];
+  all.force += sums[1];
+  all.throughput += sums[2];
+  if (sums[3] > 0) return "the gas fraction, or the gas share of the pressure force (1 - buoyancy), is not positive in some cell";
+  if (!std::isfinite(all.imbalance) || !std::isfinite(all.throughput)) return "velocity, pressure or exchange is not finite";
+  return {};
 }
 
-double GasStep::solve_momentum(GasState& state, double coupling, double leave) {
+GasStep::MomentumOutcome GasStep::check_momentum(const GasState& state, const Momentum::Given& given) {
   const PhaseTimer::Scope scope(timer, Phase::momentum);
-  return momentum.solve(state.velocity, coupling, leave);
+  MomentumOutcome outcome;
+  outcome.sums.throughput = displacement;
+  momentum.set_fluxes(state);
+  double coupling = 0;
+  for (int d = 0; d < 3 && outcome.fault.empty(); ++d) outcome.fault = add_component(d, state, given, outcome.sums, coupling);
+  return outcome;
+}
+
+GasStep::MomentumOutcome GasStep::solve_momentum(GasState& state, const Momentum::Given& given, double leave) {
+  const PhaseTimer::Scope scope(timer, Phase::momentum, static_cast<std::uint64_t>(grid.interior()));
+  MomentumOutcome outcome;
+  outcome.sums.throughput = displacement;
+  momentum.set_fluxes(state);
+  for (int d = 0; d < 3 && outcome.fault.empty(); ++d) {
+    double coupling = 0;
+    outcome.fault = add_component(d, state, given, outcome.sums, coupling);
+    if (outcome.fault.empty()) outcome.left = std::max(outcome.left, momentum.solve(d, state.velocity[d], coupling, leave));
+  }
+  return outcome;
 }
 
 PressureCorrection::Result GasStep::correct(GasState& state, double enough, double share) {
   const PhaseTimer::Scope scope(timer, Phase::pressure, static_cast<std::uint64_t>(grid.interior()));
-  pressure.assemble(momentum.fraction(), momentum.mobility());
-  pressure.set_imbalance(momentum.fraction(), state.velocity, state.fraction_rate);
+  pressure.assemble(state.fraction);
+  pressure.set_imbalance(state.fraction, state.velocity, state.fraction_rate);
   const double cells = static_cast<double>(grid.global[0]) * grid.global[1] * grid.global[2];
   const auto result = pressure.solve(setup.pressure_tolerance, enough / cells);
-  pressure.correct(state.velocity, state.pressure, momentum.mobility(), share);
-  driven.steer(state, momentum.fraction(), momentum.mobility());
+  pressure.correct(state.velocity, state.pressure, state.fraction, share);
+  driven.steer(state, pressure.matrix().coupling);
   boundaries.set_velocity_beyond(state.velocity);
   halo.fill(state.velocity);
   halo.fill(state.pressure);
@@ -149,9 +166,9 @@ GasOutcome GasSolver::advance(GasState& state, const Exchange* exchange, double 
   w.set_boundaries(state, time + dt, true);
   w.measure(state);
   outcome.reason = w.closed_box_fault(dt);
-  if (outcome.reason.empty()) outcome.reason = w.begin(state, exchange, dt);
   if (outcome.reason.empty()) {
-    outcome = w.setup.method == GasMethod::simple ? w.simple(state) : w.projection(state);
+    const Momentum::Given given{&w.old_velocity, exchange, dt};
+    outcome = w.setup.method == GasMethod::simple ? w.simple(state, given) : w.projection(state, given);
   }
   if (!outcome.converged) {
     state.velocity = w.old_velocity;
@@ -160,7 +177,7 @@ GasOutcome GasSolver::advance(GasState& state, const Exchange* exchange, double 
     w.balance = old_balance;
     return outcome;
   }
-  w.panels.set_jumps(state, w.grid, w.momentum.fraction(), w.setup.density);
+  w.panels.set_jumps(state, w.grid, w.setup.density);
   w.boundaries.set_pressure(state.pressure, false);
   w.halo.fill(state.pressure);
   w.measure(state);

@@ -8,6 +8,7 @@
 #include "gas/momentum.h"
 #include "gas/panels.h"
 #include "gas/pressure.h"
+#include "gas/workspace.h"
 
 namespace bedflow {
 
@@ -20,18 +21,21 @@ struct GasStep {
   void measure(const GasState& state);
   // Why a box without outflow cannot take this step; empty: it can.
   std::string closed_box_fault(double dt) const;
-  // Why what the momentum equations take as given cannot be; empty: it can. Collective.
-  std::string begin(const GasState& state, const Exchange* exchange, double dt);
 
-  // After begin, from a state with its boundaries set: to the velocity and pressure of the step's end.
-  GasOutcome simple(GasState& state);
-  GasOutcome projection(GasState& state);
+  // From a state with its boundaries set to the velocity and pressure of the step's end.
+  GasOutcome simple(GasState& state, const Momentum::Given& given);
+  GasOutcome projection(GasState& state, const Momentum::Given& given);
 
-  // The parts of both. The momentum equations about the present state, with sums and maximum over all ranks; Σ|∂ε/∂t| V counts as
-  // throughput.
-  Momentum::Sums assemble(const GasState& state);
-  // Sweeps of the momentum equations until they leave this share of the error; returns what they do leave.
-  double solve_momentum(GasState& state, double coupling, double leave);
+  // The parts of both. Sums are over all ranks and components, with Σ|∂ε/∂t| V as throughput.
+  struct MomentumOutcome {
+    Momentum::Sums sums;
+    double left = 0;    // share of the error that the sweeps leave at most
+    std::string fault;  // why the equations cannot be solved, for people; empty: they can
+  };
+  // The residual of the momentum equations in the present state.
+  MomentumOutcome check_momentum(const GasState& state, const Momentum::Given& given);
+  // The same, and the velocity becomes the solution but for this share of the error; with a fault it is left anyhow.
+  MomentumOutcome solve_momentum(GasState& state, const Momentum::Given& given, double leave);
   // The pressure correction, solved to setup.pressure_tolerance or Σ|imbalance| ≤ enough (m³/s), added in full to the velocity
   // and by `share` to the pressure; wanted fluxes met; ghosts right.
   PressureCorrection::Result correct(GasState& state, double enough, double share);
@@ -43,14 +47,18 @@ struct GasStep {
   PhaseTimer& timer;
   Boundaries boundaries;
   Panels panels;
+  Workspace work;
+  PressureCorrection pressure;
   Momentum momentum;
   DrivenFlow driven;
-  PressureCorrection pressure;
   FaceField old_velocity;
   Field old_pressure;
   Vec3 old_fall;
   GasBalance balance;
   double displacement = 0;  // Σ|∂ε/∂t| V, m³/s
+
+ private:
+  std::string add_component(int d, const GasState& state, const Momentum::Given& given, Momentum::Sums& all, double& coupling);
 };
 
 // Parts of a message for people.

@@ -12,31 +12,25 @@ constexpr int most_sweeps = 200;
 }  // namespace
 
 Momentum::Momentum(const Decomposition& decomposition, const Grid& grid, Halo& halo, const GasSetup& setup,
-                   const Boundaries& boundaries, const Panels& panels)
+                   const Boundaries& boundaries, const Panels& panels, Workspace& work, FaceField& mobility)
     : decomposition_(decomposition),
       grid_(grid),
       halo_(halo),
       setup_(setup),
       boundaries_(boundaries),
       panels_(panels),
-      old_fraction_(grid, 1),
-      fraction_(grid, 1),
-      local_(grid),
-      constant_(grid),
-      push_(grid),
       flux_(grid),
       divergence_(grid),
-      mobility_(grid),
+      neighbour_{&work[0], &work[1], &work[2], &work[3], &work[4], &work[5]},
+      diagonal_(work[6]),
+      source_(work[7]),
+      constant_(work[8]),
+      mobility_(mobility),
       row_sums_{RowSum(grid.cells[0] + 1), RowSum(grid.cells[0] + 1), RowSum(grid.cells[0] + 1)},
       coupling_(static_cast<std::size_t>(grid.cells[0]) + 1),
       row_(static_cast<std::size_t>(grid.cells[0]) + 1),
       carry_(static_cast<std::size_t>(grid.cells[0]) + 1) {
   if (ghosts_of(setup.convection) > 1) correction_ = Field(grid);
-  for (Equations& e : equations_) {
-    for (Field& a : e.neighbour) a = Field(grid);
-    e.diagonal = Field(grid);
-    e.source = Field(grid);
-  }
 }
 
 Int3 Momentum::low_solved(int d) const {
@@ -51,57 +45,37 @@ Int3 Momentum::high_solved(int d) const {
   return high;
 }
 
-bool Momentum::begin(const GasState& state, const FaceField& old_velocity, const Exchange* exchange, double dt) {
-  const double* epsilon = state.fraction.data();
-  const double* rate = state.fraction_rate.data();
-  double* old = old_fraction_.data();
-  for_rows(grid_, [=](auto c, int n) {
-    for (auto i = c; i < c + n; ++i) old[i] = epsilon[i] - dt * rate[i];
-  });
-  boundaries_.continue_field(old_fraction_);
-  halo_.fill(old_fraction_);
-  double least = 1;
-  for (int d = 0; d < 3; ++d) {
-    begin_component(d, state, old_velocity[d], exchange, dt);
-    const double* b = push_[d].data();
-    const double* local = local_[d].data();
-    for_rows(grid_, low_solved(d), high_solved(d), [&](auto c, int n) {
-      for (auto i = c; i < c + n; ++i) least = std::min({least, b[i], local[i]});
-    });
-  }
-  begin_panels();
-  halo_.fill(fraction_);
-  return least > 0;
-}
-
-void Momentum::begin_component(int d, const GasState& state, const Field& old_velocity, const Exchange* exchange, double dt) {
+// The diagonal without transport, what of the source does not change over outer iterations, and ε_b A, 0 where no velocity is
+// solved. Returns how many faces are unsound.
+double Momentum::begin_component(int d, const GasState& state, const Given& given) {
   const std::ptrdiff_t s = grid_.stride(d);
-  const double inertia = 0.5 * setup_.density * grid_.cell_volume() / dt, area = grid_.face_area(d);
+  const double dt = given.dt, inertia = 0.5 * setup_.density * grid_.cell_volume() / dt, area = grid_.face_area(d);
   const double weight = setup_.density * setup_.gravity[d] * grid_.cell_volume();
-  const double* epsilon = state.fraction.data();
-  const double* old = old_fraction_.data();
-  const double* u = old_velocity.data();
-  double *local = local_[d].data(), *constant = constant_[d].data(), *push = push_[d].data(), *face = fraction_[d].data();
-  Int3 high = grid_.cells;
-  ++high[d];  // the last face too
-  for_rows(grid_, {0, 0, 0}, high, [=](auto c, int n) {
-    for (auto i = c; i < c + n; ++i) {
-      face[i] = 0.5 * (epsilon[i - s] + epsilon[i]);
-      local[i] = inertia * (old[i - s] + old[i]);
-      constant[i] = local[i] * u[i];
-      push[i] = 1;
-    }
-  });
+  const double *epsilon = state.fraction.data(), *rate = state.fraction_rate.data(), *u = (*given.old_velocity)[d].data();
+  const Exchange* exchange = given.exchange;
+  const double* drag = exchange ? exchange->drag[d].data() : nullptr;
+  const double* momentum = exchange ? exchange->drag_momentum[d].data() : nullptr;
+  const double* buoyancy = exchange ? exchange->buoyancy[d].data() : nullptr;
+  double *local = diagonal_.data(), *constant = constant_.data(), *push = mobility_[d].data();
+  double* unsound = row_sums_[0].clear();
   const auto forces = [=, this](Int3 from, Int3 to, double share) {  // share: of a cell that the control volume is
-    const double* drag = exchange ? exchange->drag[d].data() : nullptr;
-    const double* momentum = exchange ? exchange->drag_momentum[d].data() : nullptr;
-    const double* buoyancy = exchange ? exchange->buoyancy[d].data() : nullptr;
-    for_rows(grid_, from, to, [=](auto c, int n) {
-      for (auto i = c; i < c + n; ++i) {
-        if (exchange) push[i] = 1 - buoyancy[i];
-        local[i] = share * local[i] + (exchange ? drag[i] : 0);
-        constant[i] = share * (constant[i] + push[i] * weight) + (exchange ? momentum[i] : 0);
-        push[i] *= area;
+    for_rows(grid_, from, to, [=](auto first, int n) {
+      const auto row = [=](auto mass_at, auto force_at, auto gas_at) {
+#pragma GCC ivdep
+        for (int i = 0; i < n; ++i) {
+          const std::ptrdiff_t c = first + i;
+          const double mass = share * inertia * ((epsilon[c - s] - dt * rate[c - s]) + (epsilon[c] - dt * rate[c]));
+          const double gas = gas_at(c);
+          local[c] = mass + mass_at(c);
+          constant[c] = mass * u[c] + share * gas * weight + force_at(c);
+          push[c] = area * gas;
+          unsound[i] += gas <= 0 || local[c] <= 0 ? 1 : 0;
+        }
+      };
+      if (exchange) {
+        row([=](auto c) { return drag[c]; }, [=](auto c) { return momentum[c]; }, [=](auto c) { return 1 - buoyancy[c]; });
+      } else {
+        row([](auto) { return 0.0; }, [](auto) { return 0.0; }, [](auto) { return 1.0; });
       }
     });
   };
@@ -118,18 +92,30 @@ void Momentum::begin_component(int d, const GasState& state, const Field& old_ve
     --inside[d];
   }
   forces(low, inside, 1);
+  for (int side = 0; side < 2; ++side) {  // no momentum is solved on faces of the box that are closed
+    if (!boundaries_.at(d, side) || boundaries_.outflow(d, side)) continue;
+    Int3 first{0, 0, 0}, end = grid_.cells;
+    first[d] = side == 0 ? 0 : grid_.cells[d];
+    end[d] = first[d] + 1;
+    for_rows(grid_, first, end, [=](auto c, int n) { std::fill_n(push + c, n, 0.0); });
+  }
+  for (const std::ptrdiff_t face : panels_.closed[d]) constant[face] = push[face] = 0;  // no force counts there
+  return row_sums_[0].total();
 }
 
 // ρg ε u A through every face, ghosts included, and ∇·U in every cell of which both faces are at hand.
-void Momentum::set_fluxes(const FaceField& velocity) {
+void Momentum::set_fluxes(const GasState& state) {
   const auto size = static_cast<std::ptrdiff_t>(grid_.size());
+  const double* epsilon = state.fraction.data();
   for (int d = 0; d < 3; ++d) {
-    const double scale = setup_.density * grid_.face_area(d);
-    const double *face = fraction_[d].data(), *u = velocity[d].data();
+    const double scale = 0.5 * setup_.density * grid_.face_area(d);
+    const double* u = state.velocity[d].data();
+    const std::ptrdiff_t s = grid_.stride(d);
     double* flux = flux_[d].data();
-    for (std::ptrdiff_t i = 0; i < size; ++i) flux[i] = scale * face[i] * u[i];
+    for (std::ptrdiff_t i = s; i < size; ++i) flux[i] = scale * (epsilon[i - s] + epsilon[i]) * u[i];
+    if (grid_.ghosts == 1) halo_.fill(flux_[d]);  // of the first layer, before which there is no ε
   }
-  const double *u = velocity[0].data(), *v = velocity[1].data(), *w = velocity[2].data();
+  const double *u = state.velocity[0].data(), *v = state.velocity[1].data(), *w = state.velocity[2].data();
   const double rx = 1 / grid_.spacing.x, ry = 1 / grid_.spacing.y, rz = 1 / grid_.spacing.z;
   const std::ptrdiff_t sy = grid_.stride(1), sz = grid_.stride(2);
   double* divergence = divergence_.data();
@@ -138,23 +124,19 @@ void Momentum::set_fluxes(const FaceField& velocity) {
   });
 }
 
-Momentum::Sums Momentum::assemble(const GasState& state) {
-  set_fluxes(state.velocity);
-  std::fill(coupling_.begin(), coupling_.end(), 0.0);
-  const double* p = state.pressure.data();
+Momentum::Sums Momentum::assemble(int d, const GasState& state, const Given& given) {
+  const double *p = state.pressure.data(), *u = state.velocity[d].data();
   Sums sums;
-  for (int d = 0; d < 3; ++d) {
-    assemble_inside(d, p, state.fall[d] * grid_.spacing[d]);
+  sums.unsound = begin_component(d, state, given);
+  assemble_inside(d, p, state.fall[d] * grid_.spacing[d]);
+  for (int side = 0; side < 2; ++side)
+    if (boundaries_.outflow(d, side)) assemble_outflow(d, side, p);
+  for (int t = 0; t < 3; ++t)
     for (int side = 0; side < 2; ++side)
-      if (boundaries_.outflow(d, side)) assemble_outflow(d, side, p);
-    for (int t = 0; t < 3; ++t)
-      for (int side = 0; side < 2; ++side)
-        if (t != d && boundaries_.at(t, side)) apply_boundary(d, t, side);
-    correct_convection(d, state.velocity[d].data());
-    apply_panels(d, state.velocity[d].data());
-    relax(d, state.velocity[d].data(), sums);
-  }
-  sums.coupling = *std::max_element(coupling_.begin(), coupling_.end());
+      if (t != d && boundaries_.at(t, side)) apply_boundary(d, t, side);
+  correct_convection(d, u);
+  apply_panels(d, state);
+  relax(d, state, sums);
   return sums;
 }
 
@@ -166,12 +148,11 @@ void Momentum::assemble_inside(int d, const double* p, double fall) {
   const auto diffusion = [&](int t) { return mu * volume / (grid_.spacing[t] * grid_.spacing[t]); };
   const double along = diffusion(d), across1 = diffusion(t1), across2 = diffusion(t2), dilatation = mu * grid_.face_area(d) / 3;
   const double *f = flux_[d].data(), *f1 = flux_[t1].data(), *f2 = flux_[t2].data(), *divergence = divergence_.data();
-  const double *local = local_[d].data(), *constant = constant_[d].data(), *push = push_[d].data();
-  Equations& e = equations_[d];
-  double *low = e.neighbour[2 * d].data(), *high = e.neighbour[2 * d + 1].data();
-  double *low1 = e.neighbour[2 * t1].data(), *high1 = e.neighbour[2 * t1 + 1].data();
-  double *low2 = e.neighbour[2 * t2].data(), *high2 = e.neighbour[2 * t2 + 1].data();
-  double *diagonal = e.diagonal.data(), *source = e.source.data();
+  const double *constant = constant_.data(), *push = mobility_[d].data();
+  double *low = neighbour_[2 * d]->data(), *high = neighbour_[2 * d + 1]->data();
+  double *low1 = neighbour_[2 * t1]->data(), *high1 = neighbour_[2 * t1 + 1]->data();
+  double *low2 = neighbour_[2 * t2]->data(), *high2 = neighbour_[2 * t2 + 1]->data();
+  double* source = source_.data();
   Int3 from{0, 0, 0};
   from[d] = boundaries_.at(d, 0) ? 1 : 0;
   for_rows(grid_, from, grid_.cells, [=](auto first, int n) {
@@ -183,7 +164,6 @@ void Momentum::assemble_inside(int d, const double* p, double fall) {
       high1[c] = across1 + std::max(-0.5 * (f1[c - s + s1] + f1[c + s1]), 0.0);
       low2[c] = across2 + std::max(0.5 * (f2[c - s] + f2[c]), 0.0);
       high2[c] = across2 + std::max(-0.5 * (f2[c - s + s2] + f2[c + s2]), 0.0);
-      diagonal[c] = local[c];
       source[c] = constant[c] + push[c] * (p[c - s] - p[c] + fall) + dilatation * (divergence[c] - divergence[c - s]);
     }
   });
@@ -196,13 +176,12 @@ std::ptrdiff_t Momentum::step_above(std::ptrdiff_t row, int n) const {
 }
 
 // Residual of the equations as they are; then Σa/α on the diagonal, the diagonal inverted, and the mobility.
-void Momentum::relax(int d, const double* u, Sums& sums) {
-  Equations& e = equations_[d];
-  const double *a0 = e.neighbour[0].data(), *a1 = e.neighbour[1].data(), *a2 = e.neighbour[2].data(), *a3 = e.neighbour[3].data(),
-               *a4 = e.neighbour[4].data(), *a5 = e.neighbour[5].data();
-  double *diagonal = e.diagonal.data(), *source = e.source.data(), *mobility = mobility_[d].data();
-  const double *push = push_[d].data(), *constant = constant_[d].data(), *face = fraction_[d].data();
-  const std::ptrdiff_t sy = grid_.stride(1), sz = grid_.stride(2);
+void Momentum::relax(int d, const GasState& state, Sums& sums) {
+  const double *a0 = neighbour_[0]->data(), *a1 = neighbour_[1]->data(), *a2 = neighbour_[2]->data(), *a3 = neighbour_[3]->data(),
+               *a4 = neighbour_[4]->data(), *a5 = neighbour_[5]->data();
+  double *diagonal = diagonal_.data(), *source = source_.data(), *mobility = mobility_[d].data();
+  const double *constant = constant_.data(), *epsilon = state.fraction.data(), *u = state.velocity[d].data();
+  const std::ptrdiff_t sy = grid_.stride(1), sz = grid_.stride(2), s = grid_.stride(d);
   const double keep = 1 / setup_.velocity_relaxation - 1;
   // Transport over the whole box instead of over a cell: convection by 1/n, diffusion by 1/n² for n cells.
   const double nx = 1.0 / grid_.global[0], ny = 1.0 / grid_.global[1], nz = 1.0 / grid_.global[2];
@@ -211,6 +190,7 @@ void Momentum::relax(int d, const double* u, Sums& sums) {
     const double n = grid_.global[t], diffusion = setup_.viscosity * grid_.cell_volume() / (grid_.spacing[t] * grid_.spacing[t]);
     fine += 2 * diffusion * (1 / n - 1 / (n * n));
   }
+  std::fill(coupling_.begin(), coupling_.end(), 0.0);
   double* coupling = coupling_.data();
   double *imbalance = row_sums_[0].clear(), *force = row_sums_[1].clear(), *throughput = row_sums_[2].clear();
   for_rows(grid_, low_solved(d), high_solved(d), [=, this](auto first, int n) {
@@ -229,36 +209,35 @@ void Momentum::relax(int d, const double* u, Sums& sums) {
       const double inverse = 1 / (still + transport);
       imbalance[i] += std::abs(lack);
       force[i] += acting;
-      throughput[i] += face[c] * (std::abs(u[c]) + acting * inverse);
+      throughput[i] += 0.5 * (epsilon[c - s] + epsilon[c]) * (std::abs(u[c]) + acting * inverse);
       source[c] += keep * transport * u[c];
       diagonal[c] = inverse;
       coupling[i] = std::max(coupling[i], transport * inverse);
-      mobility[c] = push[c] / still;
+      mobility[c] /= still;
     }
   });
-  sums.imbalance += row_sums_[0].total();
-  sums.force += row_sums_[1].total();
-  sums.throughput += row_sums_[2].total() * grid_.face_area(d) / grid_.global[d];
+  sums.imbalance = row_sums_[0].total();
+  sums.force = row_sums_[1].total();
+  sums.coupling = *std::max_element(coupling_.begin(), coupling_.end());
+  sums.throughput = row_sums_[2].total() * grid_.face_area(d) / grid_.global[d];
 }
 
 // A sweep takes the largest error down to `coupling` of what it was at least, and in the end to about its square.
-double Momentum::solve(FaceField& velocity, double coupling, double leave) {
-  const double each = std::log(std::clamp(coupling, 1e-3, 0.999));
+double Momentum::solve(int d, Field& velocity, double coupling, double leave) {
+  const double each = std::log(std::clamp(coupling, 1e-9, 0.999));
   const int sweeps = std::clamp(static_cast<int>(std::ceil(std::log(leave) / each)), 1, most_sweeps);
-  for (int n = 0; n < sweeps; ++n)
-    for (int d = 0; d < 3; ++d) {
-      sweep(d, n % 2 == 0 ? 1 : -1, velocity[d].data());
-      halo_.fill(velocity[d]);
-    }
+  for (int n = 0; n < sweeps; ++n) {
+    sweep(d, n % 2 == 0 ? 1 : -1, velocity.data());
+    halo_.fill(velocity);
+  }
   return std::exp(sweeps * each);
 }
 
 // One Gauss–Seidel sweep; within a row all but the neighbour just done is gathered first.
 void Momentum::sweep(int d, int direction, double* u) {
-  const Equations& e = equations_[d];
-  const double *a0 = e.neighbour[direction > 0 ? 0 : 1].data(), *a1 = e.neighbour[direction > 0 ? 1 : 0].data(),
-               *a2 = e.neighbour[2].data(), *a3 = e.neighbour[3].data(), *a4 = e.neighbour[4].data(), *a5 = e.neighbour[5].data(),
-               *inverse = e.diagonal.data(), *source = e.source.data();
+  const double *a0 = neighbour_[direction > 0 ? 0 : 1]->data(), *a1 = neighbour_[direction > 0 ? 1 : 0]->data(),
+               *a2 = neighbour_[2]->data(), *a3 = neighbour_[3]->data(), *a4 = neighbour_[4]->data(), *a5 = neighbour_[5]->data(),
+               *inverse = diagonal_.data(), *source = source_.data();
   const std::ptrdiff_t sy = grid_.stride(1), sz = grid_.stride(2);
   double *row = row_.data(), *carry = carry_.data();
   const Int3 low = low_solved(d), high = high_solved(d);

@@ -10,6 +10,9 @@
 // μ∇²U. On an outflow V is the half cell before the face; gas that comes back is taken to start from rest.
 //
 // Only transport is relaxed (Σa/α on the diagonal): inertia and drag stand on the diagonal as they are and need none.
+//
+// One component is assembled and solved at a time, all with the fluxes of the same velocity: their equations need no more room
+// than those of one.
 #pragma once
 
 #include <array>
@@ -18,6 +21,7 @@
 #include "gas/boundaries.h"
 #include "gas/gas_solver.h"
 #include "gas/panels.h"
+#include "gas/workspace.h"
 #include "grid/halo.h"
 #include "grid/rows.h"
 
@@ -26,11 +30,16 @@ namespace bedflow {
 class Momentum {
  public:
   Momentum(const Decomposition& decomposition, const Grid& grid, Halo& halo, const GasSetup& setup, const Boundaries& boundaries,
-           const Panels& panels);
+           const Panels& panels, Workspace& work, FaceField& mobility);
 
-  // What stays the same over the outer iterations of a step of dt (s). old_velocity: at the step's start. The state's ε has its
-  // ghosts. False: on this rank ε° or ε_b is not positive somewhere.
-  [[nodiscard]] bool begin(const GasState& state, const FaceField& old_velocity, const Exchange* exchange, double dt);
+  // What stays the same over the outer iterations of a step.
+  struct Given {
+    const FaceField* old_velocity = nullptr;  // at the step's start
+    const Exchange* exchange = nullptr;       // null: no particles
+    double dt = 0;                            // s
+  };
+  // The fluxes of a velocity, for all components. All ghosts are right, those of ε and ∂ε/∂t too.
+  void set_fluxes(const GasState& state);
 
   // Forces of this rank, N, summed over its faces, and the volume flow that they and the velocity stand for.
   struct Sums {
@@ -38,38 +47,27 @@ class Momentum {
     double force = 0;      // |pressure| + |ρ u²/L, μ u/L²| + |inertia, drag and weight together| + |imbalance|: knows no grid
     double throughput = 0;  // volume flow through a mean cross-section of each direction, m³/s
     double coupling = 0;    // the largest Σa over the relaxed diagonal (below 1): how strongly faces hang together; a maximum
+    double unsound = 0;     // faces at which ε° or ε_b is not positive
   };
-  // The equations about the present velocity and pressure (outflow ghosts: pressure on the face), and their residual there. All
-  // ghosts are right, beyond the faces of the box too.
-  Sums assemble(const GasState& state);
-  // Gauss–Seidel sweeps, there and back, of the relaxed equations of each component: as many as the coupling (the largest of all
+  // The equations of component d about the present velocity and pressure (outflow ghosts: pressure on the face) with the fluxes
+  // that are set, and their residual. Sets the component's mobility, with Σa left out of the diagonal (SIMPLEC: Van Doormaal &
+  // Raithby 1984).
+  Sums assemble(int d, const GasState& state, const Given& given);
+  // Gauss–Seidel sweeps, there and back, of the relaxed equations that are assembled: as many as the coupling (the largest of all
   // ranks) asks for to leave this share of the error, or the most that are worth while. Returns the share that they leave at
   // most.
-  double solve(FaceField& velocity, double coupling, double leave);
-
-  // After assemble: what a pressure difference over a face does to its velocity, m/s/Pa; 0 where none is solved. With Σa left
-  // out of the diagonal (SIMPLEC: Van Doormaal & Raithby 1984).
-  const FaceField& mobility() const { return mobility_; }
-  // After begin: ε on faces.
-  const FaceField& fraction() const { return fraction_; }
+  double solve(int d, Field& velocity, double coupling, double leave);
 
  private:
-  struct Equations {
-    std::array<Field, 6> neighbour;  // a; 2·direction + side
-    Field diagonal, source;          // without Σa; without pressure
-  };
-
-  void begin_component(int d, const GasState& state, const Field& old_velocity, const Exchange* exchange, double dt);
-  void set_fluxes(const FaceField& velocity);
+  double begin_component(int d, const GasState& state, const Given& given);
   void assemble_inside(int d, const double* p, double fall);
   void assemble_outflow(int d, int side, const double* p);
   void apply_boundary(int d, int t, int side);
-  void begin_panels();
-  void apply_panels(int d, const double* u);
+  void apply_panels(int d, const GasState& state);
   void correct_convection(int d, const double* u);
   template <class Scheme>
   void correct_along(const Scheme& scheme, int d, int t, const double* u);
-  void relax(int d, const double* u, Sums& sums);
+  void relax(int d, const GasState& state, Sums& sums);
   void sweep(int d, int direction, double* u);
   std::ptrdiff_t step_above(std::ptrdiff_t row, int n) const;
   Int3 low_solved(int d) const;
@@ -82,14 +80,14 @@ class Momentum {
   const Boundaries& boundaries_;
   const Panels& panels_;
 
-  Field old_fraction_;                 // ε°
-  FaceField fraction_;                 // ε
-  FaceField local_, constant_, push_;  // ρg ε° V/Δt + Σb; that and the forces which do not change; ε_b A
-  FaceField flux_;                     // ρg ε u A
-  Field divergence_;                   // ∇·U
-  Field correction_;                   // |F| (u_face − u_upstream) through a side; with schemes beyond upwind
-  std::array<Equations, 3> equations_;
-  FaceField mobility_;
+  FaceField flux_;    // ρg ε u A
+  Field divergence_;  // ∇·U
+  Field correction_;  // |F| (u_face − u_upstream) through a side; with schemes beyond upwind
+  // Of one component:
+  std::array<Field*, 6> neighbour_;  // a; 2·direction + side
+  Field &diagonal_, &source_;        // first without, then with Σa, and inverted; without the pressure of neighbours
+  Field& constant_;                  // of the source: ρg ε° V/Δt u° and the forces that do not change with U and p
+  FaceField& mobility_;              // ε_b A until the diagonal is known
   std::array<RowSum, 3> row_sums_;
   std::vector<double> coupling_, row_, carry_;
 };

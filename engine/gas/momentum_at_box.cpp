@@ -13,7 +13,6 @@ void Momentum::assemble_outflow(int d, int side, const double* p) {
   const double along = mu * volume / (grid_.spacing[d] * grid_.spacing[d]);
   const double dilatation = (side == 0 ? mu : -mu) * grid_.face_area(d) / 3;
   const double* f = flux_[d].data();
-  Equations& e = equations_[d];
   Int3 from{0, 0, 0}, to = grid_.cells;
   from[d] = side == 0 ? 0 : grid_.cells[d];
   to[d] = from[d] + 1;
@@ -21,18 +20,18 @@ void Momentum::assemble_outflow(int d, int side, const double* p) {
     for (auto c = first; c < first + n; ++c) {
       const std::ptrdiff_t cell = side == 0 ? c : c - s;  // the one before the face
       const double inward = side == 0 ? 0.5 * (f[c] + f[c + s]) : -0.5 * (f[c - s] + f[c]);
-      e.neighbour[2 * d + 1 - side].data()[c] = along + std::max(-inward, 0.0);
-      e.neighbour[2 * d + side].data()[c] = 0;
+      neighbour_[2 * d + 1 - side]->data()[c] = along + std::max(-inward, 0.0);
+      neighbour_[2 * d + side]->data()[c] = 0;
       for (int t = 0; t < 3; ++t) {
         if (t == d) continue;
         const double across = 0.5 * mu * volume / (grid_.spacing[t] * grid_.spacing[t]);
         const double* ft = flux_[t].data();
-        e.neighbour[2 * t].data()[c] = across + std::max(0.5 * ft[cell], 0.0);
-        e.neighbour[2 * t + 1].data()[c] = across + std::max(-0.5 * ft[cell + grid_.stride(t)], 0.0);
+        neighbour_[2 * t]->data()[c] = across + std::max(0.5 * ft[cell], 0.0);
+        neighbour_[2 * t + 1]->data()[c] = across + std::max(-0.5 * ft[cell + grid_.stride(t)], 0.0);
       }
-      e.diagonal.data()[c] = local_[d].data()[c] + std::max(side == 0 ? f[c] : -f[c], 0.0);
-      e.source.data()[c] =
-          constant_[d].data()[c] + push_[d].data()[c] * (p[c - s] - p[c]) + dilatation * divergence_.data()[cell];
+      diagonal_.data()[c] += std::max(side == 0 ? f[c] : -f[c], 0.0);
+      source_.data()[c] =
+          constant_.data()[c] + mobility_[d].data()[c] * (p[c - s] - p[c]) + dilatation * divergence_.data()[cell];
     }
   });
 }
@@ -44,8 +43,7 @@ void Momentum::apply_boundary(int d, int t, int side) {
   const bool fixed = std::holds_alternative<NoSlip>(boundary) || inflow_of(boundary);
   const double velocity = std::holds_alternative<NoSlip>(boundary) ? std::get<NoSlip>(boundary).velocity[d] : 0;
   const double diffusion = setup_.viscosity * grid_.cell_volume() / (grid_.spacing[t] * grid_.spacing[t]);
-  Equations& e = equations_[d];
-  double *a = e.neighbour[2 * t + side].data(), *diagonal = e.diagonal.data(), *source = e.source.data();
+  double *a = neighbour_[2 * t + side]->data(), *diagonal = diagonal_.data(), *source = source_.data();
   Int3 from = low_solved(d), to = high_solved(d);
   from[t] = side == 0 ? 0 : grid_.cells[t] - 1;
   to[t] = from[t] + 1;

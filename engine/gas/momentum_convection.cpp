@@ -20,7 +20,7 @@ template <class Scheme>
 void Momentum::correct_along(const Scheme& scheme, int d, int t, const double* u) {
   const std::ptrdiff_t s = grid_.stride(t), across = grid_.stride(d);
   const double* flux = flux_[t].data();
-  double *correction = correction_.data(), *source = equations_[d].source.data();
+  double *correction = correction_.data(), *source = source_.data();
   const Int3 low = low_solved(d), high = high_solved(d);
   Int3 first = low, end = high;  // sides
   ++end[t];

@@ -86,11 +86,13 @@ void Panels::list_along(const Grid& grid, const Boundaries& boundaries, int comp
   });
 }
 
-void Panels::set_jumps(GasState& state, const Grid& grid, const FaceField& fraction, double density) const {
+void Panels::set_jumps(GasState& state, const Grid& grid, double density) const {
+  const double* epsilon = state.fraction.data();
   for (int d = 0; d < 3; ++d)
     for (const Resistance& grate : plates[d]) {
       if (!state.jump) state.jump.emplace(grid);
-      const double superficial = fraction[d].data()[grate.face] * state.velocity[d].data()[grate.face];
+      const double fraction = 0.5 * (epsilon[grate.face - grid.stride(d)] + epsilon[grate.face]);
+      const double superficial = fraction * state.velocity[d].data()[grate.face];
       (*state.jump)[d].data()[grate.face] = grate.plate.resistance(superficial, density) * superficial;
     }
 }

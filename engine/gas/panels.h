@@ -35,7 +35,7 @@ class Panels {
   }
 
   // What the plates take of the pressure in the present flow.
-  void set_jumps(GasState& state, const Grid& grid, const FaceField& fraction, double density) const;
+  void set_jumps(GasState& state, const Grid& grid, double density) const;
 
  private:
   void mark(const Grid& grid, const Decomposition& decomposition, const Panel& panel, FaceField& covered);

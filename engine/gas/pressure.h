@@ -14,11 +14,15 @@ namespace bedflow {
 class PressureCorrection {
  public:
   PressureCorrection(const Decomposition& decomposition, const Grid& grid, Halo& halo, const Boundaries& boundaries,
-                     Preconditioner preconditioner);
+                     Preconditioner preconditioner, Workspace& work);
 
-  void assemble(const FaceField& fraction, const FaceField& mobility);
+  // What a pressure difference over a face does to its velocity, m/s/Pa; 0 where none is solved. To be set before assemble, which
+  // makes the equation of it and leaves ε A D in its place.
+  FaceField& mobility() { return matrix_.coupling; }
+  // ε has its ghosts.
+  void assemble(const Field& fraction);
   // The right side for a velocity with its ghosts.
-  void set_imbalance(const FaceField& fraction, const FaceField& velocity, const Field& fraction_rate);
+  void set_imbalance(const Field& fraction, const FaceField& velocity, const Field& fraction_rate);
 
   struct Result {
     int iterations = 0;
@@ -28,7 +32,7 @@ class PressureCorrection {
   // Until the residual has come down to `reduction` of the first, or its root mean square to `enough` (m³/s). Collective.
   Result solve(double reduction, double enough);
   // Adds u' to the velocity's solved faces and share × p' to the pressure; their ghosts are then out of date.
-  void correct(FaceField& velocity, Field& pressure, const FaceField& mobility, double share);
+  void correct(FaceField& velocity, Field& pressure, const Field& fraction, double share);
 
   const SevenPoint& matrix() const { return matrix_; }
 
@@ -40,7 +44,7 @@ class PressureCorrection {
   bool open_;  // p is given somewhere
   SevenPoint matrix_;
   ConjugateGradients solver_;
-  Field correction_, residual_;
+  Field &correction_, &residual_;
   RowSum row_sum_;
 };
 

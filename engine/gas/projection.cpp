@@ -13,23 +13,24 @@
 
 namespace bedflow {
 
-GasOutcome GasStep::projection(GasState& state) {
+GasOutcome GasStep::projection(GasState& state, const Momentum::Given& given) {
   GasOutcome outcome;
-  const Momentum::Sums sums = assemble(state);
-  if (!std::isfinite(sums.imbalance) || !std::isfinite(sums.throughput)) {
-    outcome.reason = "velocity, pressure or exchange is not finite at the step's start";
+  const MomentumOutcome moved = solve_momentum(state, given, setup.tolerance);
+  const double throughput = moved.sums.throughput;
+  if (!moved.fault.empty()) {
+    outcome.reason = moved.fault + " at the step's start";
     return outcome;
   }
-  outcome.momentum_residual = solve_momentum(state, sums.coupling, setup.tolerance);
+  outcome.momentum_residual = moved.left;
   if (outcome.momentum_residual > setup.tolerance) {
     outcome.reason = join("gas is carried too far in the step: the momentum solve leaves up to ", outcome.momentum_residual,
                           " of the change of velocity; wanted ", setup.tolerance);
     return outcome;
   }
-  const auto result = correct(state, setup.pressure_tolerance * sums.throughput, 1);
+  const auto result = correct(state, setup.pressure_tolerance * throughput, 1);
   outcome.iterations = 1;
   outcome.pressure_iterations = result.iterations;
-  outcome.continuity_residual = result.imbalance == 0 ? 0 : result.imbalance / sums.throughput;
+  outcome.continuity_residual = result.imbalance == 0 ? 0 : result.imbalance / throughput;
   outcome.converged = std::isfinite(result.imbalance) && (result.reached || outcome.continuity_residual <= setup.tolerance);
   if (!outcome.converged) {
     outcome.reason = std::isfinite(outcome.continuity_residual)

@@ -33,7 +33,7 @@ double cpu_seconds() {
 
 Outcome ours(const PressureSystem::Kind& kind, Preconditioner preconditioner) {
   PressureSystem system(kind);
-  ConjugateGradients solver(system.decomposition, system.grid, system.halo, preconditioner);
+  ConjugateGradients solver(system.decomposition, system.grid, system.halo, preconditioner, system.work);
   Field x(system.grid);
   const double start = cpu_seconds();
   solver.factor(system.matrix);

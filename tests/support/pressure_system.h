@@ -26,6 +26,7 @@ struct PressureSystem {
         grid(decomposition),
         halo(decomposition, grid, timer),
         matrix(grid),
+        work(grid),
         right(grid) {
     for (int d = 0; d < 3; ++d) {
       Int3 high = grid.cells, at{};
@@ -64,6 +65,7 @@ struct PressureSystem {
   PhaseTimer timer;
   Halo halo;
   SevenPoint matrix;
+  Workspace work;
   Field right;
 
  private:

@@ -23,7 +23,7 @@ std::vector<Kind> kinds() {
 
 int iterations(const Kind& kind, const Comm& comm = Comm::self()) {
   PressureSystem system(kind, comm);
-  ConjugateGradients solver(system.decomposition, system.grid, system.halo, Preconditioner::multigrid);
+  ConjugateGradients solver(system.decomposition, system.grid, system.halo, Preconditioner::multigrid, system.work);
   solver.factor(system.matrix);
   Field x(system.grid);
   return solver.solve(system.matrix, system.singular(), system.right, x, 1e-6, 0).iterations;
@@ -156,7 +156,7 @@ TEST(ConjugateGradients, EveryPreconditionerFindsTheSolution) {
       if (choice == Preconditioner::unpreconditioned && kind.drag >= 1e3)
         continue;  // does not get there in thousands of iterations
       PressureSystem system(kind, Comm::world());
-      ConjugateGradients solver(system.decomposition, system.grid, system.halo, choice);
+      ConjugateGradients solver(system.decomposition, system.grid, system.halo, choice, system.work);
       solver.factor(system.matrix);
       Field x(system.grid);
       Field b = system.right;
