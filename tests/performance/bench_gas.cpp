@@ -142,7 +142,7 @@ void steps(benchmark::State& state, const Bed& bed, GasMethod method, Preconditi
 }
 
 // What solver, state and exchange keep on the heap, a cell.
-void memory(benchmark::State& state) {
+void memory(benchmark::State& state, GasMethod method) {
   const auto in_use = [] {
     const struct mallinfo2 heap = mallinfo2();
     return static_cast<double>(heap.uordblks + heap.hblkhd);
@@ -150,7 +150,7 @@ void memory(benchmark::State& state) {
   double bytes = 0;
   for (auto _ : state) {
     const double before = in_use();
-    MovingBed moving(cube(64), GasMethod::projection, Preconditioner::multigrid);
+    MovingBed moving(cube(64), method, Preconditioner::multigrid);
     moving.move_particles();
     moving.step();
     bytes = (in_use() - before) / moving.cells();
@@ -176,13 +176,21 @@ void add_all() {
   add("projection/cube64", cube(64), projection, multigrid);
   add("projection/cube96", cube(96), projection, multigrid, 10);
   add("projection/cube128", cube(128), projection, multigrid);
-  benchmark::RegisterBenchmark("projection/memory", memory)->Iterations(1);
+  benchmark::RegisterBenchmark("projection/memory", memory, projection)->Iterations(1);
+  benchmark::RegisterBenchmark("simple/memory", memory, simple)->Iterations(1);
   // The other way to precondition, beside those.
   add("simple/goldschmidt/multigrid", goldschmidt, simple, multigrid);
   add("simple/cube64/incomplete_cholesky", cube(64), simple, cholesky);
   add("projection/mueller/multigrid", mueller, projection, multigrid);
   add("projection/goldschmidt/incomplete_cholesky", goldschmidt, projection, cholesky);
 }
+
+// Of the ranks but the first.
+class Silent : public benchmark::BenchmarkReporter {
+ public:
+  bool ReportContext(const Context& /*context*/) override { return true; }
+  void ReportRuns(const std::vector<Run>& /*runs*/) override {}
+};
 
 }  // namespace
 }  // namespace bedflow
@@ -191,5 +199,9 @@ int main(int argc, char** argv) {
   const bedflow::MpiSession session(&argc, &argv);
   bedflow::add_all();
   benchmark::Initialize(&argc, argv);
-  benchmark::RunSpecifiedBenchmarks();
+  bedflow::Silent silent;
+  if (bedflow::Comm::world().root())
+    benchmark::RunSpecifiedBenchmarks();
+  else
+    benchmark::RunSpecifiedBenchmarks(&silent);
 }

@@ -7,7 +7,7 @@ usage: figures.py [--record] BIN_FOLDER [GROUP...]
 dem     the particle side by itself, CPU time on one core, medians of three
 gas     the gas by itself, likewise
 transfer  between particles and gas, both ways, likewise
-bed     whole beds, by the engine's summary.json
+bed     whole beds from a fluidized state, by CPU time and the engine's summary.json
 peers   ours against LAMMPS on the same bed, in turn (needs Debian's package lammps)
 scaling 1 and 2 ranks measured, up to 10 000 predicted by the cost model of scaling.py
 
@@ -18,7 +18,7 @@ import sys
 
 import peers
 import scaling
-from measuring import Baseline, Figure, engine, line, machine, run, scratch, sweep
+from measuring import Baseline, Figure, cpu_seconds, engine, line, machine, run, scratch, sweep
 
 # Figure -> (direction, limit).
 TARGETS = {
@@ -33,6 +33,11 @@ TARGETS = {
     "gas/projection/goldschmidt": ("<=", 0.8),
     "gas/projection/cube128": ("<=", 1.0),
     "gas/projection/memory": ("<=", 400),
+    "gas/simple/memory": ("<=", 400),
+    "gas/simple_over_projection/mueller": ("<=", 4),
+    "gas/simple_over_projection/goldschmidt": ("<=", 4),
+    "gas/simple_over_projection/cube64": ("<=", 4),
+    "gas/two_ranks": (">=", 1.8),
     "transfer/mueller": ("<=", 0.10),
     "transfer/goldschmidt": ("<=", 0.10),
     "dem/hertz_mindlin/settled": ("<=", 0.075),
@@ -46,7 +51,12 @@ TARGETS = {
     "peers/lammps/spring/settled": (">=", 2.5),
     "peers/lammps/spring/agitated": (">=", 2.5),
     "bed/mueller/particle_substep": ("<=", 0.30),
-    "bed/mueller/gas_share": ("<=", 40),
+    "bed/mueller/gas_and_transfer": ("<=", 30),
+    "bed/goldschmidt-1.5/gas_and_transfer": ("<=", 30),
+    "bed/mueller@mfix-exa-2018/gas_and_transfer": ("<=", 30),
+    "bed/goldschmidt-1.5@mfix-exa-2018/gas_and_transfer": ("<=", 30),
+    "bed/mueller@mfix-exa-2018/cost": ("<=", 112),
+    "bed/goldschmidt-1.5@mfix-exa-2018/cost": ("<=", 200),
 }
 
 
@@ -62,22 +72,48 @@ def dem(bin_folder):
 
 
 def gas(bin_folder):
-    yield from sweep(bin_folder, "gas")
+    value = {}
+    for figure in sweep(bin_folder, "gas"):
+        value[figure.name] = figure.value
+        yield figure
+    for bed in ("mueller", "goldschmidt", "cube64"):
+        ratio = value[f"gas/simple/{bed}"] / value[f"gas/projection/{bed}"]
+        yield Figure(f"gas/simple_over_projection/{bed}", ratio, "times a projection step")
+    yield scaling.two_ranks_of_gas(bin_folder)
 
 
 def transfer(bin_folder):
     yield from sweep(bin_folder, "transfer")
 
 
-def bed(bin_folder, name="mueller", fluidized=0.25, measured=0.05):
-    """A whole bed on one rank: run until it is fluidized, then resumed and measured (simulated s)."""
+# What is changed of a ready case to have it fluidized after FLUIDIZED (simulated s): a start of 1 s takes the bed long.
+FLUIDIZED, MEASURED = 0.5, 0.05
+SOONER = {"mueller": [], "goldschmidt-1.5": ["domain.faces.y_low.inflow.ramp.duration=0.2"]}
+
+
+def bed(bin_folder):
+    for name in SOONER:
+        for preset in ("mfix-exa-2018", ""):  # the paper's settings, and the ready case's own
+            yield from whole_bed(bin_folder, name, preset)
+
+
+def whole_bed(bin_folder, name, preset):
+    """A bed on one rank: run until it is fluidized, then resumed and measured."""
+    def case(end):
+        changes = [part for change in [f"time.end={end}", *SOONER[name]] for part in ("--set", change)]
+        return run([bin_folder / "bedflow", "init", name, *(["--preset", preset] if preset else []), *changes])
     with scratch() as folder:
-        for end in (fluidized, fluidized + measured):
-            summary = engine(bin_folder, run([bin_folder / "bedflow", "init", name, "--set", f"time.end={end}"]), folder)
-    yield Figure(f"bed/{name}/particle_substep", summary["particle_substep_microseconds"], "us per particle and sub-step, all told")
-    yield Figure(f"bed/{name}/gas_share", 100 * summary["gas_share"], "% of the time")
-    yield Figure(f"bed/{name}/transfer_share", 100 * summary["transfer_share"], "% of the time")
-    yield Figure(f"bed/{name}/cost", summary["cpu_seconds_per_simulated_second"], "CPU s per simulated s")
+        engine(bin_folder, case(FLUIDIZED), folder)
+        before = cpu_seconds()
+        summary = engine(bin_folder, case(FLUIDIZED + MEASURED), folder)
+        cost = (cpu_seconds() - before) / summary["simulated_seconds"]
+    bed_name = f"bed/{name}" + (f"@{preset}" if preset else "")
+    substeps = summary["substeps"] / summary["steps"]
+    yield Figure(f"{bed_name}/particle_substep", summary["particle_substep_microseconds"], "us per particle and sub-step, all told")
+    yield Figure(f"{bed_name}/gas_and_transfer", 100 * (summary["gas_share"] + summary["transfer_share"]), "% of the time",
+                 [f"gas {100 * summary['gas_share']:.3g}", f"transfer {100 * summary['transfer_share']:.3g}",
+                  f"{substeps:.3g} sub-steps a step", f"{summary['gas_iterations'] / summary['steps']:.3g} outer iterations"])
+    yield Figure(f"{bed_name}/cost", cost, "CPU s per simulated s")
 
 
 GROUPS = {"dem": dem, "gas": gas, "transfer": transfer, "bed": bed, "peers": peers.against_lammps, "scaling": scaling.scaling}

@@ -3,6 +3,7 @@ import dataclasses
 import json
 import os
 import pathlib
+import resource
 import statistics
 import subprocess
 import sys
@@ -65,6 +66,12 @@ def run(command, core=None, **options):
     if result.returncode != 0:
         sys.exit(f"figures.py: {' '.join(command)} ended with {result.returncode}:\n{result.stderr}{result.stdout[-2000:]}")
     return result.stdout
+
+
+def cpu_seconds():
+    """Of all commands that have ended."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 def one_core():

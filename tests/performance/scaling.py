@@ -29,13 +29,14 @@ SUBSTEPS = 200
 NETWORK = {"latency": 2e-6, "bandwidth": 12.5e9 * 256 / 32 / 64, "reduction": 2e-6}
 NETWORK_SAID = ("# assumed: 2 us a message and 2 us a stage of a reduction (log2 P stages), 12.5 GB/s a node of 64 ranks whose 8 x 8 columns "
                 "share it; all else is measured here, c with both cores busy")
+AS_ROOT = {**os.environ, "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
 RANKS = (1, 2, 4, 16, 64, 256, 1024, 4096, 10000)
 
 
 def bench(bin_folder, ranks, *arguments):
     """What bench_scaling says; ranks that exceed the cores give volumes, not times."""
     bound = ["--bind-to", "core"] if ranks <= (os.cpu_count() or 1) else ["--oversubscribe", "--bind-to", "none"]
-    environment = {**os.environ, "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+    environment = {**AS_ROOT}
     if ranks > (os.cpu_count() or 1):
         environment["OMPI_MCA_mpi_yield_when_idle"] = "1"
     said = json.loads(run(["mpirun", *bound, "-n", ranks, bin_folder / "bench_scaling", *arguments], env=environment))
@@ -62,6 +63,18 @@ def two_ranks(bin_folder, law="coulomb", turns=3):
     ratios = sorted(one / two for one, two in times)
     yield Figure(f"dem/{law}/two_ranks", statistics.median(ratios), "times as fast as one", [
         f"{'' if turns == 1 else f'from {ratios[0]:.3g} to {ratios[-1]:.3g}'}", "198000 particles"])
+
+
+def two_ranks_of_gas(bin_folder, turns=5):
+    """How many times as fast two ranks are as one on 96³ cells, wall time: the best of each, in turn."""
+    def seconds(ranks):
+        said = run(["mpirun", "--bind-to", "core", "-n", ranks, bin_folder / "bench_gas", "--benchmark_format=json",
+                    "--benchmark_filter=projection/cube96"], env=AS_ROOT)
+        return json.loads(said)["benchmarks"][0]["real_time"]
+    times = [(seconds(1), seconds(2)) for _ in range(turns)]
+    one, two = (min(column) for column in zip(*times))
+    ratios = sorted(a / b for a, b in times)
+    return Figure("gas/two_ranks", one / two, "times as fast as one", [f"from {ratios[0]:.3g} to {ratios[-1]:.3g}", "96^3 cells"])
 
 
 class Model:
