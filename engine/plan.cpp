@@ -26,10 +26,6 @@ constexpr double particle_step_seconds = 0.06e-6;  // to the grid and back
 constexpr double cell_step_seconds = 0.25e-6;      // two outer iterations of SIMPLE
 constexpr double projection_cell_seconds = 0.21e-6;
 
-// Below this many cells the many cheap iterations of incomplete Cholesky cost SIMPLE, which solves its pressure to a hundredth,
-// no more than the few of a multigrid (tests/performance/bench_gas.cpp); the projection goes to a millionth.
-constexpr std::int64_t smallest_multigrid = 20000;
-
 constexpr double widest_skin =
     0.8;  // of a cell: half of it a particle may be outside its block, where the halo must know the gas
 
@@ -158,9 +154,7 @@ void plan_space(Plan& plan) {
 
 void plan_pressure(Plan& plan) {
   if (!plan.scene.gas) return;
-  const bool small = plan.scene.gas->setup.method == GasMethod::simple && plan.cell_count < smallest_multigrid;
-  const auto faster = small ? Preconditioner::incomplete_cholesky : Preconditioner::multigrid;
-  plan.scene.gas->setup.preconditioner = plan.scene.gas->preconditioner.value_or(faster);
+  plan.scene.gas->setup.preconditioner = plan.scene.gas->preconditioner.value_or(Preconditioner::multigrid);
 }
 
 void plan_cost(Plan& plan) {
@@ -241,8 +235,7 @@ void plan_parts(Plan& plan) {
     const Preconditioner preconditioner = scene.gas->setup.preconditioner;
     add("multigrid for the pressure", preconditioner == Preconditioner::multigrid,
         std::string("gas.") + name(preconditioner) +
-            (scene.gas->preconditioner ? ": the case says so"
-                                       : ": the faster for " + std::to_string(plan.cell_count) + " cells"));
+            (scene.gas->preconditioner ? ": the case says so" : ": its iterations do not grow with the grid"));
     const auto& scheme = scene.gas->setup.convection;
     const bool second = !std::holds_alternative<Upwind>(scheme);
     add("convection of second order", second,

@@ -7,7 +7,9 @@
 //   coupling of a coarse face: the sum over its faces × distance of the fine centres / distance of the coarse ones
 //
 // which is Galerkin's operator of constant interpolation, with the over-correction of smooth errors taken out (Braess 1995): it
-// couples six cells again, and whatever the coefficients jump by, no error is corrected by more than the distances' ratio.
+// couples six cells again, and whatever the coefficients jump by, no error is corrected by more than the distances' ratio. Where
+// flat cells are joined in one direction only, a barrier inside a pair counts too, in series, to a third at the least: a
+// bubble's thin roof still stands on the coarse levels.
 // Smoothing is Gauss–Seidel in red and black, over-relaxed (Yavneh 1996), in reverse order after the coarse correction, and more
 // of it on coarser levels, which cost little. M is symmetric and positive (semi)definite, on any number of ranks. In single
 // precision: M need not be exact, and half the bytes are half the time.

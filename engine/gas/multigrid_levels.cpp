@@ -17,6 +17,14 @@ constexpr double growth = 0.5;     // half sweeps grow with this power of the ra
 constexpr double most_half_sweeps = 16;
 constexpr double relaxation = 1.15;  // Yavneh 1996: about the best in three dimensions
 
+constexpr float barrier = 0.35f;  // of what distances alone would couple: the least that is left over a barrier in flat cells
+
+// From the middle of a pair of cells to that of the next, by the couplings in the one, between them, and in the other.
+float in_series(float before, float between, float after) {
+  if (!(before > 0 && between > 0 && after > 0)) return 0;
+  return 1 / (0.5f / before + 1 / between + 0.5f / after);
+}
+
 std::vector<float> joined_by_twos(const std::vector<float>& edges) {
   std::vector<float> result;
   for (std::size_t i = 0; i < edges.size(); i += 2) result.push_back(edges[i] + (i + 1 < edges.size() ? edges[i + 1] : 0));
@@ -161,6 +169,7 @@ void Multigrid::coarsen(const Level& fine, Level& coarse) const {
   for (int d = 0; d < 3; ++d) {
     if (coarse.global[d] == 1 && decomposition_.periodic(d)) continue;  // a cell beside itself
     const int t1 = (d + 1) % 3, t2 = (d + 2) % 3;
+    const bool alone = fine.joined[d] == 2 && fine.joined[t1] == 1 && fine.joined[t2] == 1;
     Int3 high = coarse.cells, at{};
     ++high[d];
     for (at[2] = 0; at[2] < high[2]; ++at[2])
@@ -169,14 +178,19 @@ void Multigrid::coarsen(const Level& fine, Level& coarse) const {
           Int3 low;
           for (int t = 0; t < 3; ++t) low[t] = std::min(fine.joined[t] * at[t], fine.cells[t]);
           const Int3 end = fine.end(low);
+          const float near = fine.edge(d, low[d] - 1) + fine.edge(d, low[d]);
+          const float far = coarse.edge(d, at[d] - 1) + coarse.edge(d, at[d]);
+          const bool series = alone && low[d] >= 2 && low[d] + 1 < fine.cells[d];  // else a half is another rank's, or none
           float sum = 0;
           Int3 from = low;
           for (from[t2] = low[t2]; from[t2] < end[t2]; ++from[t2])
-            for (from[t1] = low[t1]; from[t1] < end[t1]; ++from[t1])
-              sum += fine.coupling[d][fine.index(from[0], from[1], from[2])];
-          const float near = fine.edge(d, low[d] - 1) + fine.edge(d, low[d]);
-          const float far = coarse.edge(d, at[d] - 1) + coarse.edge(d, at[d]);
-          coarse.coupling[d][coarse.index(at[0], at[1], at[2])] = sum * near / far;
+            for (from[t1] = low[t1]; from[t1] < end[t1]; ++from[t1]) {
+              const float* face = fine.coupling[d].data() + fine.index(from[0], from[1], from[2]);
+              const float even = *face * near / far;
+              sum +=
+                  series ? std::clamp(in_series(face[-fine.stride(d)], *face, face[fine.stride(d)]), barrier * even, even) : even;
+            }
+          coarse.coupling[d][coarse.index(at[0], at[1], at[2])] = sum;
         }
   }
 }
