@@ -106,6 +106,40 @@ class Check {
   double smallest_ = std::numeric_limits<double>::infinity();  // radius of a type, m
 };
 
+// Whether a particle of a region can be seeded astride of the panel: its place is then on either side, or on both.
+bool astride(const SeedRegion& region, const Panel& panel, double radius) {
+  const auto reaches = [&](Vec3 low, Vec3 high) {
+    for (int d = 0; d < 3; ++d) {
+      const bool flat = panel.low[d] == panel.high[d];
+      if (high[d] <= panel.low[d] + (flat ? 1e-9 : 0) * radius || low[d] >= panel.high[d] - (flat ? 1e-9 : 0) * radius)
+        return false;
+    }
+    return true;
+  };
+  return std::visit(
+      [&]<class Seeds>(const Seeds& seeds) {
+        if constexpr (std::is_same_v<Seeds, PlacedSeeds>) {
+          return std::any_of(seeds.begin(), seeds.end(), [&](const PlacedSphere& sphere) {
+            const double r = sphere.diameter > 0 ? sphere.diameter / 2 : radius;
+            return reaches(sphere.position - Vec3{r, r, r}, sphere.position + Vec3{r, r, r});
+          });
+        } else {
+          return reaches(seeds.low, seeds.high);
+        }
+      },
+      region.seeds);
+}
+
+void check_panels(const Scene& scene, std::ostringstream& all) {
+  if (!scene.gas) return;
+  const std::vector<Panel>& panels = scene.gas->setup.panels;
+  for (const SeedRegion& region : scene.particles->regions)
+    for (std::size_t p = 0; p < panels.size(); ++p)
+      if (astride(region, panels[p], scene.particles->largest() / 2))
+        all << "\n  domain.panels[" << p << "] crosses the seeds of " << region.path
+            << ": particles would stand astride of it; end the region at the panel, and put another behind it";
+}
+
 }  // namespace
 
 std::string walls_text(const std::vector<Wall>& walls) {
@@ -125,6 +159,7 @@ void check_walls(const Scene& scene, double skin, double substep) {
     const std::string why = Check(scene, skin, substep)(scene.walls[w]);
     if (!why.empty()) all << "\n  walls[" << w << "], " << scene.walls[w].name << ", " << why;
   }
+  check_panels(scene, all);
   if (!all.str().empty()) throw Stop(Reason::invalid_case, "walls that cannot be:" + all.str());
 }
 

@@ -47,7 +47,8 @@ Simulation::CouplingPart::CouplingPart(const Decomposition& decomposition, const
                 .gravity = plan.scene.gravity,
                 .fraction_floor = plan.scene.coupling->fraction_floor,
                 .scheme = plan.scene.coupling->scheme,
-                .types = plan.scene.particles->types},
+                .types = plan.scene.particles->types,
+                .panels = plan.scene.gas->setup.panels},
                timer),
       fraction_before(gas.grid) {}
 

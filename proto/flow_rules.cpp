@@ -1,4 +1,5 @@
 // What drives the gas and stands in its way inside the box: courses in time, driven periodic directions, panels.
+#include <algorithm>
 #include <cmath>
 
 #include "case_rules.h"
@@ -73,6 +74,49 @@ void check_panel(const v1::Case& value, const v1::Panel& panel, const std::strin
   }
 }
 
+std::size_t normal_of(const v1::Panel& panel) {
+  std::size_t normal = 0;
+  while (normal < 2 && component(panel.low(), normal) != component(panel.high(), normal)) ++normal;
+  return normal;
+}
+
+bool overlap(const v1::Panel& a, const v1::Panel& b, std::size_t normal) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const bool apart =
+        component(a.low(), axis) >= component(b.high(), axis) || component(b.low(), axis) >= component(a.high(), axis);
+    if (axis != normal && apart) return false;
+  }
+  return true;
+}
+
+// What the transfer between particles and gas asks: on either side of a baffle a face to which a particle's share can go.
+void check_panels_beside_particles(const v1::Case& value, CaseFaults& faults) {
+  const auto& panels = value.domain().panels();
+  if (!panels.empty() && value.coupling().has_gaussian()) {
+    faults.push_back(
+        {"coupling.gaussian", "spreads particles through domain.panels: choose another kernel, or remove the panels"});
+  }
+  for (int i = 0; i < panels.size(); ++i) {
+    if (!panels[i].has_baffle()) continue;
+    const std::size_t normal = normal_of(panels[i]);
+    const double size = component(value.domain().size(), normal), cell = size / component(value.domain().cells(), normal);
+    const double place = component(panels[i].low(), normal), least = 1.5 * cell;
+    const std::string path = item_path("domain.panels", i) + ".baffle";
+    if (!component(value.domain().periodic(), normal) && std::min(place, size - place) < least) {
+      faults.push_back({path,
+                        "stands one cell from a face of the box, too near for particles between them to act on the gas: "
+                        "move it by a cell"});
+    }
+    for (int j = 0; j < i; ++j) {
+      if (!panels[j].has_baffle() || normal_of(panels[j]) != normal || !overlap(panels[i], panels[j], normal)) continue;
+      const double apart = std::abs(place - component(panels[j].low(), normal));
+      if (apart == 0 || apart > least) continue;
+      faults.push_back({path, "stands one cell from " + item_path("domain.panels", j) +
+                                  ", too near for particles between them to act on the gas: move it by a cell"});
+    }
+  }
+}
+
 }  // namespace
 
 void check_schedule(const Instants& schedule, const std::string& path, CaseFaults& faults) {
@@ -89,9 +133,7 @@ void check_flow(const v1::Case& value, CaseFaults& faults) {
   for (int i = 0; i < value.domain().panels_size(); ++i) {
     check_panel(value, value.domain().panels(i), item_path("domain.panels", i), faults);
   }
-  if (value.domain().panels_size() > 0 && value.has_particles()) {
-    faults.push_back({"domain.panels", "not built yet: panels that particles feel; remove particles or the panels"});
-  }
+  if (value.has_coupling() && value.domain().has_cells()) check_panels_beside_particles(value, faults);
 }
 
 }  // namespace bedflow

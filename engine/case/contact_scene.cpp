@@ -83,7 +83,7 @@ Parameters parameters(const v1::Particles& from, const std::string& type, const 
   return to;
 }
 
-// make(parameters) for each pair of types, each type on the faces of the box, and each wall and type.
+// make(parameters) for each pair of types, each type on the faces of the box, and each wall, then each panel, and type.
 template <class Make>
 auto table(const v1::Case& from, const std::vector<ContactType>& types, Make make) {
   LawTable<decltype(make(Parameters{}))> result;
@@ -93,6 +93,8 @@ auto table(const v1::Case& from, const std::vector<ContactType>& types, Make mak
   }
   for (const v1::Wall& wall : from.walls())
     for (const ContactType& type : types) result.walls.push_back(make(parameters(from.particles(), type.name, wall)));
+  for (int i = 0; i < from.domain().panels_size(); ++i)
+    for (const ContactType& type : types) result.walls.push_back(make(parameters(from.particles(), type.name, "wall")));
   return result;
 }
 

@@ -74,6 +74,26 @@ Motion motion(const v1::Wall& from) {
   }
 }
 
+// A panel as particles meet it: a sheet of two facets. Where it ends on a face of the box it goes on beyond, so that there is
+// no rim to be touched, and across periodic faces it closes.
+Wall sheet(const v1::Panel& panel, const v1::Lengths& size, const std::string& name) {
+  Vec3 low = vec(panel.low()), high = vec(panel.high());
+  const Vec3 box{size.x(), size.y(), size.z()};
+  int normal = 0;
+  for (int d = 0; d < 3; ++d) {
+    if (low[d] == high[d]) {
+      normal = d;
+      continue;
+    }
+    if (low[d] <= 1e-9 * box[d]) low[d] = -box[d];
+    if (high[d] >= (1 - 1e-9) * box[d]) high[d] = 2 * box[d];
+  }
+  Vec3 one = low, other = high;
+  one[(normal + 1) % 3] = high[(normal + 1) % 3];
+  other[(normal + 1) % 3] = low[(normal + 1) % 3];
+  return {name, Mesh({Facet::of({low, one, high}), Facet::of({low, high, other})}), Still{}};
+}
+
 }  // namespace
 
 std::vector<Wall> wall_scene(const v1::Case& from) {
@@ -88,6 +108,9 @@ std::vector<Wall> wall_scene(const v1::Case& from) {
     }
     walls.push_back({wall.name(), std::move(shape), motion(wall)});
   }
+  if (!from.has_particles()) return walls;
+  for (int i = 0; i < from.domain().panels_size(); ++i)
+    walls.push_back(sheet(from.domain().panels(i), size, "domain.panels[" + std::to_string(i) + "]"));
   return walls;
 }
 

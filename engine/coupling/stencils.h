@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/check.h"
+#include "coupling/fences.h"
 #include "coupling/lattices.h"
 #include "particles/store.h"
 
@@ -24,25 +25,27 @@ class Stencils {
 
   explicit Stencils(const Grid& grid) : stride_{1, grid.stride(1), grid.stride(2)} {}
 
-  // Shares beyond the ends of a lattice fold onto its last points. A lattice shorter than `points` has shares of 0 beyond its
-  // end, where there must be ghosts.
+  // Shares beyond the ends of a lattice, or beyond a fence, fold onto the last points before them. Where these are fewer than
+  // `points` there are shares of 0 beyond them, and there must be ghosts.
   template <class Kernel, class DiameterOf>
-  void locate(const Kernel& kernel, DiameterOf diameter_of, const Grid& grid, const Lattices& lattices,
+  void locate(const Kernel& kernel, DiameterOf diameter_of, const Grid& grid, const Lattices& lattices, const Fences& fences,
               const ParticleStore& particles) {
     rows_.resize(particles.owned);
     const Vec3 per_spacing{1 / grid.spacing.x, 1 / grid.spacing.y, 1 / grid.spacing.z};
     for (std::size_t p = 0; p < particles.owned; ++p) {
-      const Vec3 place = particles.position(p);
+      Vec3 place;  // in cells
+      for (int d = 0; d < 3; ++d) place[d] = (particles.position(p)[d] - grid.low[d]) * per_spacing[d];
       const double diameter = diameter_of(p);  // m
       Row& row = rows_[p];
       std::int32_t first[2][3];
       for (int d = 0; d < 3; ++d) {
-        const double s = (place[d] - grid.low[d]) * per_spacing[d], size = diameter * per_spacing[d];
+        const double s = place[d], size = diameter * per_spacing[d];
         CHECK(s > 0.5 - grid.ghosts && s < grid.cells[d] + grid.ghosts - 0.5, d, s);
         for (const int faces : {0, 1}) {
           double share[points]{};
           int at = kernel.along(faces ? s : s - 0.5, size, share, points);
-          const int low = lattices.low(faces, d), high = lattices.high(d);
+          int low = lattices.low(faces, d), high = lattices.high(d);
+          if (!fences.empty()) fences.narrow(place, d, faces, low, high);
           if (at < low || at + points - 1 > high) at = fold(at, low, high, share);
           for (int q = 1; q < points; ++q) row.tail[faces][d][q - 1] = share[q];
           first[faces][d] = static_cast<std::int32_t>(at * stride_[d]);

@@ -45,6 +45,7 @@ Transfer::Transfer(const Decomposition& decomposition, const Grid& grid, Halo& h
       relaxes_(std::visit([](const auto& scheme) { return scheme.relaxes; }, setup.scheme)),
       timer_(timer),
       lattices_(decomposition, grid),
+      fences_(decomposition, grid, setup.panels),
       stencils_(stencils_for(kernel_points(setup.kernel, setup.diameter, grid.spacing), grid)),
       gradient_(grid),
       buoyancy_share_(grid, 1) {
@@ -74,8 +75,9 @@ void Transfer::find_sizes(const ParticleStore& particles) {
 void Transfer::locate(const ParticleStore& particles) {
   find_sizes(particles);
   const auto diameter_of = [&](std::size_t p) { return sizes_.diameter_of(p); };
-  std::visit([&](auto& stencils, const auto& kernel) { stencils.locate(kernel, diameter_of, grid_, lattices_, particles); },
-             stencils_, setup_.kernel);
+  std::visit(
+      [&](auto& stencils, const auto& kernel) { stencils.locate(kernel, diameter_of, grid_, lattices_, fences_, particles); },
+      stencils_, setup_.kernel);
 }
 
 double Transfer::deposit_volume(const ParticleStore& particles, Field& fraction) {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "base/phase_timer.h"
+#include "coupling/fences.h"
 #include "coupling/lattices.h"
 #include "coupling/smoothing.h"
 #include "coupling/stencils.h"
@@ -38,6 +39,7 @@ struct TransferSetup {
   double fraction_floor = 0.35;  // of ε
   ExchangeScheme scheme{};
   std::vector<ParticleType> types = {};  // where there are several types or sizes: volumes and masses are then each's own
+  std::vector<Panel> panels = {};        // inside the box; not with a Gaussian, which would spread through them
 };
 
 // What the particles do while the gas takes a step.
@@ -128,6 +130,7 @@ class Transfer {
   bool relaxes_;
   PhaseTimer& timer_;
   Lattices lattices_;
+  Fences fences_;
   std::optional<Smoothing> smoothing_;
   std::variant<Stencils<2>, Stencils<3>, Stencils<4>> stencils_;
   Interval step_;

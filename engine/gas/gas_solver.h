@@ -48,7 +48,7 @@ struct GasState {
   Field fraction;       // ε, at centres, ghosts filled; 1 without particles
   Field fraction_rate;  // ∂ε/∂t, 1/s, at centres; 0 without particles or with the displacement switched off
 
-  std::optional<FaceField> jump;  // with plates in the scene: pressure that they take, Pa; no particle feels it as ∇p
+  std::optional<FaceField> jump;  // with panels in the scene: pressure that they take, Pa; no particle feels it as ∇p
   Vec3 fall;                      // of pressure per length along periodic directions, beside that of p, Pa/m
 
   explicit GasState(const Grid& grid) : velocity(grid), pressure(grid), fraction(grid, 1), fraction_rate(grid) {}

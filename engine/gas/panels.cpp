@@ -87,14 +87,19 @@ void Panels::list_along(const Grid& grid, const Boundaries& boundaries, int comp
 }
 
 void Panels::set_jumps(GasState& state, const Grid& grid, double density) const {
-  const double* epsilon = state.fraction.data();
-  for (int d = 0; d < 3; ++d)
+  const double *epsilon = state.fraction.data(), *p = state.pressure.data();
+  for (int d = 0; d < 3; ++d) {
+    if (plates[d].empty() && closed[d].empty()) continue;
+    if (!state.jump) state.jump.emplace(grid);
+    const double *u = state.velocity[d].data(), fall = state.fall[d] * grid.spacing[d];
+    const std::ptrdiff_t s = grid.stride(d);
+    double* jump = (*state.jump)[d].data();
     for (const Resistance& grate : plates[d]) {
-      if (!state.jump) state.jump.emplace(grid);
-      const double fraction = 0.5 * (epsilon[grate.face - grid.stride(d)] + epsilon[grate.face]);
-      const double superficial = fraction * state.velocity[d].data()[grate.face];
-      (*state.jump)[d].data()[grate.face] = grate.plate.resistance(superficial, density) * superficial;
+      const double superficial = 0.5 * (epsilon[grate.face - s] + epsilon[grate.face]) * u[grate.face];
+      jump[grate.face] = grate.plate.resistance(superficial, density) * superficial;
     }
+    for (const std::ptrdiff_t face : closed[d]) jump[face] = p[face - s] - p[face] + fall;
+  }
 }
 
 }  // namespace bedflow

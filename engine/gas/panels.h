@@ -34,7 +34,8 @@ class Panels {
       for (const std::ptrdiff_t face : closed[d]) velocity[d].data()[face] = 0;
   }
 
-  // What the plates take of the pressure in the present flow.
+  // What the panels take of the pressure in the present flow, and no particle feels as ∇p: a plate by its resistance, a baffle
+  // whatever differs across it.
   void set_jumps(GasState& state, const Grid& grid, double density) const;
 
  private:

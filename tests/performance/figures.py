@@ -8,12 +8,15 @@ dem     the particle side by itself, CPU time on one core, medians of three
 gas     the gas by itself, likewise
 transfer  between particles and gas, both ways, likewise
 bed     whole beds from a fluidized state, by CPU time and the engine's summary.json
+presets the presets on the Müller bed: what they cost, and what they say of it
 peers   ours against LAMMPS on the same bed, in turn (needs Debian's package lammps)
 scaling 1 and 2 ranks measured, up to 10 000 predicted by the cost model of scaling.py
 
 --record keeps the figures as this machine's baseline. The exit code is 1 when a figure is short of its target.
 """
+import json
 import pathlib
+import statistics
 import sys
 
 import peers
@@ -116,7 +119,32 @@ def whole_bed(bin_folder, name, preset):
     yield Figure(f"{bed_name}/cost", cost, "CPU s per simulated s")
 
 
-GROUPS = {"dem": dem, "gas": gas, "transfer": transfer, "bed": bed, "peers": peers.against_lammps, "scaling": scaling.scaling}
+PRESETS = ("mfix-exa-2018", "mfix-garg-upwind", "mfix-garg-smart", "mfix-dpvm-upwind", "mfix-dpvm-smart", "bedflow")
+
+
+def presets(bin_folder, start=0.2, end=0.7):
+    """Means from start to end (simulated s), of a bed that bubbles: they scatter from bed to bed."""
+    for preset in PRESETS:
+        def case(until, preset=preset):
+            return run([bin_folder / "bedflow", "init", "mueller", "--preset", preset, "--set", f"time.end={until}"])
+        with scratch() as folder:
+            engine(bin_folder, case(start), folder)
+            before = cpu_seconds()
+            summary = engine(bin_folder, case(end), folder)
+            cost = (cpu_seconds() - before) / summary["simulated_seconds"]
+            said = json.loads(run([bin_folder / "bedflow", "stats", folder, "bed_pressure_drop", "bed_height", "--from", start,
+                                   "--samples", "-o", "json"]))
+        drops, heights = ([sample["value"] for sample in said if sample["name"] == name] for name in ("bed_pressure_drop", "bed_height"))
+        gas = 100 * (summary["gas_share"] + summary["transfer_share"])
+        yield Figure(f"presets/{preset}/cost", cost, "CPU s per simulated s", [f"gas and transfer {gas:.3g} %"])
+        yield Figure(f"presets/{preset}/pressure_drop", statistics.mean(drops), "Pa",
+                     [f"deviation in time {statistics.stdev(drops):.3g}", f"{len(drops)} samples"])
+        yield Figure(f"presets/{preset}/bed_height", 1e3 * statistics.mean(heights), "mm, mean of the particles",
+                     [f"deviation in time {1e3 * statistics.stdev(heights):.3g}"])
+
+
+GROUPS = {"dem": dem, "gas": gas, "transfer": transfer, "bed": bed, "presets": presets,
+          "peers": peers.against_lammps, "scaling": scaling.scaling}
 
 
 def main(arguments):

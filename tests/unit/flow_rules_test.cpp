@@ -133,10 +133,26 @@ TEST(Panels, BaffleDoesNotStandAcrossAFluxThatIsHeld) {
               ElementsAre(fault_at("domain.panels[0].baffle", "drive that direction by pressure_drop")));
 }
 
-TEST(Panels, AreRefusedBesideParticles) {
+// Beside particles: 48 cells of 2.5 mm up the bed.
+TEST(Panels, LeaveParticlesAFaceOnEitherSide) {
   v1::Case value = ready_case("mueller");
   add_panel(value, 0, 0.022, 0.03, 0.03);
-  EXPECT_THAT(check_case(value), ElementsAre(fault_at("domain.panels", "not built yet")));
+  EXPECT_THAT(check_case(value), IsEmpty());
+  add_panel(value, 0.022, 0.044, 0.0325, 0.0325);  // beside it, not above
+  EXPECT_THAT(check_case(value), IsEmpty());
+  add_panel(value, 0, 0.022, 0.0325, 0.0325);
+  EXPECT_THAT(check_case(value), ElementsAre(fault_at("domain.panels[2].baffle", "one cell from domain.panels[0]")));
+  value.mutable_domain()->mutable_panels(2)->mutable_plate();  // which lets gas through
+  EXPECT_THAT(check_case(value), IsEmpty());
+  add_panel(value, 0, 0.022, 0.0025, 0.0025);
+  EXPECT_THAT(check_case(value), ElementsAre(fault_at("domain.panels[3].baffle", "one cell from a face")));
+}
+
+TEST(Panels, AreNotForAGaussian) {
+  v1::Case value = ready_case("mueller");
+  add_panel(value, 0, 0.022, 0.03, 0.03);
+  value.mutable_coupling()->mutable_gaussian();
+  EXPECT_THAT(check_case(value), ElementsAre(fault_at("coupling.gaussian", "domain.panels")));
 }
 
 TEST(TimeRules, LongestStepIsNotBelowTheStep) {
