@@ -63,10 +63,10 @@ Simulation::Simulation(const Plan& plan, const Comm& comm, PhaseTimer& timer, Cu
     insertion_ = std::make_unique<Insertion>(decomposition_, dem_->setup(), particles.kinds, particles.inlets);
   }
   if (plan.scene.coupling) coupling_ = std::make_unique<CouplingPart>(decomposition_, plan_, *gas_, timer_);
-  audit_exchange_ =
-      coupling_ && std::any_of(plan.scene.monitors.begin(), plan.scene.monitors.end(), [](const MonitorSetup& monitor) {
-        return std::holds_alternative<MomentumBalance>(monitor.statistic);
-      });
+  for (const MonitorSetup& monitor : plan.scene.monitors) {
+    if (!coupling_ || !std::holds_alternative<MomentumBalance>(monitor.statistic)) continue;
+    audit_interval_ = std::min(audit_interval_, monitor.interval);
+  }
 }
 
 // ------------------------------------------------------------------------------------------------ one step
@@ -79,7 +79,7 @@ void Simulation::step() {
   if (coupling_) deposit_drag(dt);                                            // b and bV -> faces
   if (gas_) dt = advance_gas(dt);                                             // U, p
   if (coupling_) coupling_->transfer.sample(gas_->state, dem_->particles());  // U, ∇p -> F_g
-  if (audit_exchange_) audit_exchange();
+  if (audit_due(dt)) audit_exchange();
   if (dem_) advance_particles(dt);  // contacts, walls, motion, in sub-steps
   time_ = controller_.end(time_, dt);
   if (dem_) turn_over_particles(dt);  // some have entered, some have left
@@ -153,6 +153,13 @@ double Simulation::advance_gas(double dt) {
 
 void Simulation::note(const std::string& change) {
   if (!change.empty()) notes_.push_back("step " + std::to_string(steps_ + 1) + ": " + change);
+}
+
+// In the steps after which a monitor takes a sample (statistics/monitors.h), the first and the last.
+bool Simulation::audit_due(double dt) const {
+  if (!std::isfinite(audit_interval_)) return false;
+  if (steps_ == 0 || audit_interval_ <= 0 || time_ + dt >= plan_.scene.end_time - 1e-3 * dt) return true;
+  return std::floor((time_ + 1.001 * dt) / audit_interval_) > std::floor((time_ + 1e-3 * last_step_) / audit_interval_);
 }
 
 // What the gas lost less what the particles received, in the worst direction, over the sum of absolute values.

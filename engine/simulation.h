@@ -1,6 +1,7 @@
 // One coupled step. The laws of gas and coupling are visited here, those of contacts in particles/forces.h.
 #pragma once
 
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -97,6 +98,7 @@ class Simulation {
   void watch(double dt);
   Amount amount_here() const;
   Amount present() const;
+  bool audit_due(double dt) const;
   void audit_exchange();
   void put_particles(CheckpointContent& content) const;
   void put_contacts(CheckpointContent& content) const;
@@ -118,8 +120,8 @@ class Simulation {
   StepController controller_;
   double time_ = 0, last_step_ = 0, settled_time_ = 0;
   double max_overlap_ = 0;
-  std::vector<WallLoad> wall_loads_;  // of the last step
-  bool audit_exchange_ = false;       // a monitor asks for it
+  std::vector<WallLoad> wall_loads_;                                 // of the last step
+  double audit_interval_ = std::numeric_limits<double>::infinity();  // the shortest of the monitors that ask for it, s
   double exchange_residual_ = 0;
   std::int64_t particle_count_ = 0, next_id_ = 0;
   Turnover turnover_;

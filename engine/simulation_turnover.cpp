@@ -15,12 +15,24 @@ void Simulation::turn_over_particles(double dt) {
     for (const Newcomer& n : newcomers) turnover_.entered.add(dem_->setup().types[n.type].mass_of(n.radius));
     dem_->enter(newcomers);
   }
-  const Amount gone = dem_->take_departed(), here = amount_here();
-  std::array<double, 4> sums{static_cast<double>(gone.count), gone.mass, static_cast<double>(here.count), here.mass};
+  const Departed gone = dem_->take_departed();
+  const Amount here = amount_here();
+  std::array<double, 10> sums{static_cast<double>(here.count),
+                              here.mass,
+                              static_cast<double>(gone.amount.count),
+                              gone.amount.mass,
+                              gone.momentum.x,
+                              gone.momentum.y,
+                              gone.momentum.z,
+                              gone.debt.x,
+                              gone.debt.y,
+                              gone.debt.z};
   decomposition_.comm().sum(sums);
-  turnover_.left.count += static_cast<std::int64_t>(sums[0]);
-  turnover_.left.mass += sums[1];
-  const Amount there{static_cast<std::int64_t>(sums[2]), sums[3]};
+  const Amount there{static_cast<std::int64_t>(sums[0]), sums[1]};
+  turnover_.left.count += static_cast<std::int64_t>(sums[2]);
+  turnover_.left.mass += sums[3];
+  turnover_.momentum_left += {sums[4], sums[5], sums[6]};
+  turnover_.debt_left += {sums[7], sums[8], sums[9]};
   particle_count_ = there.count;
   if (turnover_.balances(there)) return;
   std::ostringstream text;
@@ -72,6 +84,10 @@ void Simulation::put_turnover(CheckpointContent& content) const {
   put("initial", turnover_.initial);
   put("entered", turnover_.entered);
   put("left", turnover_.left);
+  for (int d = 0; d < 3; ++d) {
+    content.numbers[std::string("turnover/momentum_left_") + "xyz"[d]] = turnover_.momentum_left[d];
+    content.numbers[std::string("turnover/debt_left_") + "xyz"[d]] = turnover_.debt_left[d];
+  }
   content.numbers["turnover/next_id"] = static_cast<double>(next_id_);
   const std::vector<InletState> states = insertion_ ? insertion_->states() : std::vector<InletState>();
   content.numbers["inlets/count"] = static_cast<double>(states.size());
@@ -89,7 +105,11 @@ void Simulation::restore_turnover(const CheckpointSource& from) {
   const auto take = [&](const std::string& name) {
     return Amount{count("turnover/" + name + "_count"), from.number("turnover/" + name + "_mass")};
   };
-  turnover_ = {take("initial"), take("entered"), take("left")};
+  turnover_ = {take("initial"), take("entered"), take("left"), {}, {}};
+  for (int d = 0; d < 3; ++d) {
+    turnover_.momentum_left[d] = from.number(std::string("turnover/momentum_left_") + "xyz"[d]);
+    turnover_.debt_left[d] = from.number(std::string("turnover/debt_left_") + "xyz"[d]);
+  }
   next_id_ = count("turnover/next_id");
   if (!insertion_) return;
   std::vector<InletState> states(static_cast<std::size_t>(count("inlets/count")));

@@ -68,9 +68,12 @@ json sizes_entry(const ParticleScene& particles, const std::vector<SizeMoments>&
 // Particles since time 0, kg.
 json turnover_entry(const RunTotals& totals) {
   const auto entry = [](const Amount& amount) { return json{{"count", amount.count}, {"mass", amount.mass}}; };
+  const auto vector = [](Vec3 v) { return json{v.x, v.y, v.z}; };
   return {{"initial", entry(totals.turnover.initial)},
           {"entered", entry(totals.turnover.entered)},
           {"left", entry(totals.turnover.left)},
+          {"momentum_left", vector(totals.turnover.momentum_left)},
+          {"impulse_owed_to_left", vector(totals.turnover.debt_left)},
           {"mass_due", totals.mass_due},
           {"blocked_steps", totals.blocked_steps}};
 }

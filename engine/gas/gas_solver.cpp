@@ -92,41 +92,40 @@ std::string GasStep::closed_box_fault(double dt) const {
               " m3/s, growth of the gas volume (d eps/dt) ", balance.storage, " m3/s; make one face an outflow");
 }
 
-// Assembles a component and adds its sums; coupling becomes its own. Returns a fault. Collective.
-std::string GasStep::add_component(int d, const GasState& state, const Momentum::Given& given, Momentum::Sums& all,
-                                   double& coupling) {
-  const Momentum::Sums one = momentum.assemble(d, state, given);
-  std::array<double, 4> sums{one.imbalance, one.force, one.throughput, one.unsound};
+// The sums of all ranks, and what is wrong with them. Collective.
+void GasStep::conclude(MomentumOutcome& outcome) const {
+  Momentum::Sums& all = outcome.sums;
+  std::array<double, 4> sums{all.imbalance, all.force, all.throughput, all.unsound};
   decomposition.comm().sum(sums);
-  coupling = decomposition.comm().max(one.coupling);
-  all.imbalance += sums[0];
-  all.force += sums[1];
-  all.throughput += sums[2];
-  if (sums[3] > 0) return "the gas fraction, or the gas share of the pressure force (1 - buoyancy), is not positive in some cell";
-  if (!std::isfinite(all.imbalance) || !std::isfinite(all.throughput)) return "velocity, pressure or exchange is not finite";
-  return {};
+  all.imbalance = sums[0];
+  all.force = sums[1];
+  all.throughput = sums[2] + displacement;
+  if (sums[3] > 0)
+    outcome.fault = "the gas fraction, or the gas share of the pressure force (1 - buoyancy), is not positive in some cell";
+  else if (!std::isfinite(all.imbalance) || !std::isfinite(all.throughput))
+    outcome.fault = "velocity, pressure or exchange is not finite";
 }
 
 GasStep::MomentumOutcome GasStep::check_momentum(const GasState& state, const Momentum::Given& given) {
   const PhaseTimer::Scope scope(timer, Phase::momentum);
   MomentumOutcome outcome;
-  outcome.sums.throughput = displacement;
   momentum.set_fluxes(state);
-  double coupling = 0;
-  for (int d = 0; d < 3 && outcome.fault.empty(); ++d) outcome.fault = add_component(d, state, given, outcome.sums, coupling);
+  for (int d = 0; d < 3; ++d) outcome.sums += momentum.assemble(d, state, given);
+  conclude(outcome);
   return outcome;
 }
 
 GasStep::MomentumOutcome GasStep::solve_momentum(GasState& state, const Momentum::Given& given, double leave) {
   const PhaseTimer::Scope scope(timer, Phase::momentum, static_cast<std::uint64_t>(grid.interior()));
   MomentumOutcome outcome;
-  outcome.sums.throughput = displacement;
   momentum.set_fluxes(state);
-  for (int d = 0; d < 3 && outcome.fault.empty(); ++d) {
-    double coupling = 0;
-    outcome.fault = add_component(d, state, given, outcome.sums, coupling);
-    if (outcome.fault.empty()) outcome.left = std::max(outcome.left, momentum.solve(d, state.velocity[d], coupling, leave));
+  for (int d = 0; d < 3; ++d) {
+    const Momentum::Sums sums = momentum.assemble(d, state, given);
+    outcome.sums += sums;
+    const double coupling = decomposition.comm().max(sums.coupling);
+    outcome.left = std::max(outcome.left, momentum.solve(d, state.velocity[d], coupling, leave));
   }
+  conclude(outcome);
   return outcome;
 }
 

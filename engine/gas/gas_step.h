@@ -58,7 +58,7 @@ struct GasStep {
   double displacement = 0;  // Σ|∂ε/∂t| V, m³/s
 
  private:
-  std::string add_component(int d, const GasState& state, const Momentum::Given& given, Momentum::Sums& all, double& coupling);
+  void conclude(MomentumOutcome& outcome) const;
 };
 
 // Parts of a message for people.

@@ -224,7 +224,7 @@ void Momentum::relax(int d, const GasState& state, Sums& sums) {
 
 // A sweep takes the largest error down to `coupling` of what it was at least, and in the end to about its square.
 double Momentum::solve(int d, Field& velocity, double coupling, double leave) {
-  const double each = std::log(std::clamp(coupling, 1e-9, 0.999));
+  const double each = std::log(coupling < 0.999 ? std::max(coupling, 1e-9) : 0.999);  // also of what is not finite
   const int sweeps = std::clamp(static_cast<int>(std::ceil(std::log(leave) / each)), 1, most_sweeps);
   for (int n = 0; n < sweeps; ++n) {
     sweep(d, n % 2 == 0 ? 1 : -1, velocity.data());

@@ -15,6 +15,7 @@
 // than those of one.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <vector>
 
@@ -48,14 +49,20 @@ class Momentum {
     double throughput = 0;  // volume flow through a mean cross-section of each direction, m³/s
     double coupling = 0;    // the largest Σa over the relaxed diagonal (below 1): how strongly faces hang together; a maximum
     double unsound = 0;     // faces at which ε° or ε_b is not positive
+
+    Sums& operator+=(const Sums& b) {
+      imbalance += b.imbalance, force += b.force, throughput += b.throughput, unsound += b.unsound;
+      coupling = std::max(coupling, b.coupling);
+      return *this;
+    }
   };
   // The equations of component d about the present velocity and pressure (outflow ghosts: pressure on the face) with the fluxes
   // that are set, and their residual. Sets the component's mobility, with Σa left out of the diagonal (SIMPLEC: Van Doormaal &
   // Raithby 1984).
   Sums assemble(int d, const GasState& state, const Given& given);
-  // Gauss–Seidel sweeps, there and back, of the relaxed equations that are assembled: as many as the coupling (the largest of all
-  // ranks) asks for to leave this share of the error, or the most that are worth while. Returns the share that they leave at
-  // most.
+  // Gauss–Seidel sweeps, there and back, of the relaxed equations that are assembled, sound or not: as many as the coupling (the
+  // largest of all ranks) asks for to leave this share of the error, or the most that are worth while. Returns the share that
+  // they leave at most.
   double solve(int d, Field& velocity, double coupling, double leave);
 
  private:

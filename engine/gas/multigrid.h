@@ -46,6 +46,7 @@ class Multigrid {
     std::array<std::array<int, 2>, 3> neighbour{};  // the rank beyond; -1: nobody
     // A layer of ghosts around the cells, x fastest.
     std::array<std::vector<float>, 3> coupling;  // by the cell's lower face
+    std::array<std::vector<float>, 3> nearer;    // of faces along a direction: distance of the finer level's centres over its own
     std::vector<float> inverse;                  // relaxation over the diagonal; 0: a cell that touches no other
     std::vector<float> x, b;                     // correction and right side
 
@@ -60,6 +61,7 @@ class Multigrid {
 
   void add_level(const std::array<Edges, 3>& edges, Int3 place, bool whole);
   bool choose_joined(Level& level) const;
+  void measure(const Level& fine, Level& coarse) const;
   void coarsen(const Level& fine, Level& coarse) const;
   void invert(Level& level) const;
   void gather_couplings(const Level& from, Level& to);

@@ -86,6 +86,7 @@ Multigrid::Multigrid(const Decomposition& decomposition, const Grid& grid) : dec
       if (level.joined[d] == 2)
         for (auto& block : edges[d]) block = joined_by_twos(block);
   }
+  for (std::size_t l = 1; l < levels_.size(); ++l) measure(levels_[l - 1], levels_[l]);
   if (gathered_ > 0) set_order();
   row_.resize(static_cast<std::size_t>(levels_[0].global[0]) + 2);
 }
@@ -165,6 +166,15 @@ void Multigrid::factor(const SevenPoint& matrix) {
   }
 }
 
+void Multigrid::measure(const Level& fine, Level& coarse) const {
+  for (int d = 0; d < 3; ++d)
+    for (int face = 0; face <= coarse.cells[d]; ++face) {
+      const int low = std::min(fine.joined[d] * face, fine.cells[d]);
+      const float near = fine.edge(d, low - 1) + fine.edge(d, low), far = coarse.edge(d, face - 1) + coarse.edge(d, face);
+      coarse.nearer[d].push_back(near / far);
+    }
+}
+
 void Multigrid::coarsen(const Level& fine, Level& coarse) const {
   for (int d = 0; d < 3; ++d) {
     if (coarse.global[d] == 1 && decomposition_.periodic(d)) continue;  // a cell beside itself
@@ -178,15 +188,14 @@ void Multigrid::coarsen(const Level& fine, Level& coarse) const {
           Int3 low;
           for (int t = 0; t < 3; ++t) low[t] = std::min(fine.joined[t] * at[t], fine.cells[t]);
           const Int3 end = fine.end(low);
-          const float near = fine.edge(d, low[d] - 1) + fine.edge(d, low[d]);
-          const float far = coarse.edge(d, at[d] - 1) + coarse.edge(d, at[d]);
+          const float nearer = coarse.nearer[d][static_cast<std::size_t>(at[d])];
           const bool series = alone && low[d] >= 2 && low[d] + 1 < fine.cells[d];  // else a half is another rank's, or none
           float sum = 0;
           Int3 from = low;
           for (from[t2] = low[t2]; from[t2] < end[t2]; ++from[t2])
             for (from[t1] = low[t1]; from[t1] < end[t1]; ++from[t1]) {
               const float* face = fine.coupling[d].data() + fine.index(from[0], from[1], from[2]);
-              const float even = *face * near / far;
+              const float even = *face * nearer;
               sum +=
                   series ? std::clamp(in_series(face[-fine.stride(d)], *face, face[fine.stride(d)]), barrier * even, even) : even;
             }

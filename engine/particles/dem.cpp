@@ -129,9 +129,11 @@ void Dem::rebuild() {
   list_.save(particles_, now_, history_);
   walls_.save(now_, history_);
   drop_ghosts();
-  const Amount gone = take_departed_particles(decomposition_.size(), setup_, particles_, history_);
-  departed_.count += gone.count;
-  departed_.mass += gone.mass;
+  const Departed gone = take_departed_particles(decomposition_.size(), setup_, particles_, history_);
+  departed_.amount.count += gone.amount.count;
+  departed_.amount.mass += gone.amount.mass;
+  departed_.momentum += gone.momentum;
+  departed_.debt += gone.debt;
   for (const Newcomer& n : newcomers_) {
     particles_.add(setup_, n.id, n.position, n.velocity, {}, n.type, n.radius);
     history_.append_particle();

@@ -39,7 +39,7 @@ class Dem {
   void enter(const std::vector<Newcomer>& newcomers);
   // What left through outlets since the last take, this rank. A particle is taken out when the pair list is rebuilt: until then
   // it is beyond the face by half a skin at most, and goes on pushing those behind it.
-  Amount take_departed() { return std::exchange(departed_, {}); }
+  Departed take_departed() { return std::exchange(departed_, {}); }
 
   // Replaces all particles of this rank, each inside this rank's block (ghosts are made here). Collective.
   void set_particles(ParticleStore particles);
@@ -129,7 +129,7 @@ class Dem {
   double deepest_ = 0;
   std::int64_t contacts_ = 0, rebuilds_ = 0;
   std::vector<Newcomer> newcomers_;  // of this rank, until the list is rebuilt
-  Amount departed_;
+  Departed departed_;
   Failure failure_;
   bool stopped_ = false;  // agreed by all ranks
 };

@@ -2,7 +2,7 @@
 
 namespace bedflow {
 
-Amount take_departed_particles(Vec3 size, const DemSetup& setup, ParticleStore& particles, ContactHistory& history) {
+Departed take_departed_particles(Vec3 size, const DemSetup& setup, ParticleStore& particles, ContactHistory& history) {
   if (!setup.has_outlet()) return {};
   const auto departed = [&](Vec3 x) {
     for (int d = 0; d < 3; ++d) {
@@ -11,11 +11,14 @@ Amount take_departed_particles(Vec3 size, const DemSetup& setup, ParticleStore& 
     }
     return false;
   };
-  Amount gone;
+  Departed gone;
   std::size_t kept = 0;
   for (std::size_t i = 0; i < particles.owned; ++i) {
     if (departed(particles.position(i))) {
-      gone.add(mass_of(setup.types, particles, i));
+      const double mass = mass_of(setup.types, particles, i);
+      gone.amount.add(mass);
+      gone.momentum += mass * particles.velocity(i);
+      if (!particles.gas_response.empty()) gone.debt += particles.gas_response[i].debt;
       continue;
     }
     if (kept < i) {

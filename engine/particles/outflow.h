@@ -9,6 +9,6 @@ namespace bedflow {
 
 // Takes out the particles whose centres are beyond a face that lets them leave, with their histories, and closes the gaps, in
 // order. The store holds owned particles only. size: of the box, m.
-Amount take_departed_particles(Vec3 size, const DemSetup& setup, ParticleStore& particles, ContactHistory& history);
+Departed take_departed_particles(Vec3 size, const DemSetup& setup, ParticleStore& particles, ContactHistory& history);
 
 }  // namespace bedflow

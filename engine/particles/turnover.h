@@ -25,8 +25,16 @@ struct Amount {
   }
 };
 
+// Particles that have left.
+struct Departed {
+  Amount amount;
+  Vec3 momentum;  // m V, kg·m/s
+  Vec3 debt;      // what they had received from the gas beyond what it lost for them, N·s: nobody pays it any more
+};
+
 struct Turnover {
   Amount initial, entered, left;
+  Vec3 momentum_left{}, debt_left{};  // of those, as above
 
   // Whether what is present is what should be: the count exactly, the mass to the round-off of sums of so many terms.
   bool balances(const Amount& present) const {
