@@ -11,6 +11,7 @@ bed     whole beds from a fluidized state, by CPU time and the engine's summary.
 presets the presets on the Müller bed: what they cost, and what they say of it
 peers   ours against LAMMPS on the same bed, in turn (needs Debian's package lammps)
 scaling 1 and 2 ranks measured, up to 10 000 predicted by the cost model of scaling.py
+service submissions, 10 000 jobs, a million samples, 1000 watchers, on the real server and engine
 
 --record keeps the figures as this machine's baseline. The exit code is 1 when a figure is short of its target.
 """
@@ -60,6 +61,12 @@ TARGETS = {
     "bed/goldschmidt-1.5@mfix-exa-2018/gas_and_transfer": ("<=", 30),
     "bed/mueller@mfix-exa-2018/cost": ("<=", 112),
     "bed/goldschmidt-1.5@mfix-exa-2018/cost": ("<=", 200),
+    "service/submit/median": ("<=", 5),
+    "service/list/first_page": ("<=", 50),
+    "service/restart": ("<=", 2),
+    "service/statistics/million": ("<=", 100),
+    "service/watchers/engine_cost": ("<=", 1),
+    "service/watchers/memory": ("<=", 200),
 }
 
 
@@ -143,8 +150,15 @@ def presets(bin_folder, start=0.2, end=0.7):
                      [f"deviation in time {1e3 * statistics.stdev(heights):.3g}"])
 
 
+def service(bin_folder):
+    for said in run([bin_folder / "bench_service"]).splitlines():
+        name, value, unit, *notes = said.split(", ")
+        yield Figure(name, float(value), unit, notes)
+
+
 GROUPS = {"dem": dem, "gas": gas, "transfer": transfer, "bed": bed, "presets": presets,
-          "peers": peers.against_lammps, "scaling": scaling.scaling}
+          "peers": peers.against_lammps, "scaling": scaling.scaling,
+          "service": service}
 
 
 def main(arguments):

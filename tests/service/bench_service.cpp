@@ -1,9 +1,12 @@
 // The service's figures, a line each: name, value, unit, notes (tests/performance/figures.py reads them). Real server, real
 // engine, real disk.
 //
-// usage: bench_service [submit|queue|statistics]...
+// usage: bench_service [submit|queue|statistics|watchers]...
 #include <grpcpp/grpcpp.h>
+#include <sched.h>
 #include <signal.h>
+#include <time.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -23,6 +26,7 @@
 #include "process.h"
 #include "record_log.h"
 #include "support/server_process.h"
+#include "watchers.h"
 
 namespace bedflow::test {
 namespace {
@@ -194,14 +198,90 @@ void statistics() {
   report("service/statistics/million", quantile(times, 0.5), "ms", text_of("thinned to 2000; the first time %.3g ms", first));
 }
 
+// Threads that the process has now; later ones inherit it.
+void pin(pid_t process, int core) {
+  cpu_set_t cores;
+  CPU_ZERO(&cores);
+  CPU_SET(core, &cores);
+  for (const auto& thread : std::filesystem::directory_iterator("/proc/" + std::to_string(process) + "/task")) {
+    ::sched_setaffinity(std::stoi(thread.path().filename()), sizeof cores, &cores);
+  }
+}
+
+// CPU time of a process, s.
+double cpu_seconds(pid_t process) {
+  clockid_t clock{};
+  timespec time{};
+  if (::clock_getcpuclockid(process, &clock) != 0 || ::clock_gettime(clock, &time) != 0) throw std::runtime_error("no CPU clock");
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+}
+
+// 1000 watchers, 100 of them frozen, on a bed at rest: what the engine's steps cost more, and the server's memory. The engine has
+// a core of its own, server and watchers share another; CPU time, so that what else runs on the machine counts as little as it
+// can.
+void watchers() {
+  TemporaryFolder folder;
+  ServerProcess server(BEDFLOW_BIN_DIR "/bedflowd", folder.path() / "data", BEDFLOW_BIN_DIR "/bedflow-engine");
+  auto request = ready_case("settling");
+  request.mutable_case_()->mutable_time()->set_end(1000);
+  request.mutable_case_()->clear_output();
+  grpc::ClientContext context;
+  v1::CreateJobResponse response;
+  must(server.stub().CreateJob(&context, request, &response));
+  const std::string id = response.job().id();
+  if (wait_for_state(server.stub(), id, v1::RUNNING, 120s).state() != v1::RUNNING) throw std::runtime_error("no engine runs");
+  const pid_t engine = server.engines(id).at(0);
+  pin(engine, 0);
+  pin(server.pid(), 1);
+  pin(::getpid(), 1);
+  std::uint64_t last = 0;
+  // CPU time of a step over about so long, told by the engine's own progress.
+  const auto cost = [&](std::chrono::seconds span) {
+    double first_cpu = 0, cpu = 0;
+    std::uint64_t first_step = 0, step = 0;
+    const auto end = Clock::now() + span;
+    const auto told = watch(
+        server.stub(), id, last,
+        [&](const v1::WatchJobResponse& one) {
+          last = std::max<std::uint64_t>(last, one.sequence());
+          if (!one.event().has_progress()) return false;
+          step = one.event().progress().step();
+          cpu = cpu_seconds(engine);
+          if (first_step == 0) first_step = step, first_cpu = cpu;
+          return Clock::now() > end;
+        },
+        span + 60s);
+    return (cpu - first_cpu) / static_cast<double>(step - first_step);
+  };
+  cost(5s);  // comes to rest, and the replay of history is over
+  std::vector<double> ratios;
+  for (int pair = 0; pair < 8; ++pair) {
+    const auto with = [&] {
+      Watching crowd(server.address(), id, 1000, 100);
+      if (!crowd.have_begun(60s)) throw std::runtime_error("not all watchers began");
+      return cost(4s);
+    };
+    const bool with_first = pair % 2 == 0;  // what drifts cancels
+    const double one = with_first ? with() : cost(4s), other = with_first ? cost(4s) : with();
+    ratios.push_back(with_first ? one / other : other / one);
+  }
+  report("service/watchers/engine_cost", 100 * (quantile(ratios, 0.5) - 1), "% more CPU time a step with 1000 watchers",
+         text_of("eight pairs, %.3g to %.3g %%", 100 * (quantile(ratios, 0) - 1), 100 * (quantile(ratios, 1) - 1)));
+  const auto memory = server::read_text("/proc/" + std::to_string(server.pid()) + "/status");
+  report("service/watchers/memory", std::stod(memory.substr(memory.find("VmHWM:") + 6)) / 1024, "MiB at most",
+         "1000 watchers, 100 of them frozen");
+}
+
 }  // namespace
 }  // namespace bedflow::test
 
 int main(int argc, char** argv) {
-  const std::map<std::string, std::function<void()>> parts = {
-      {"submit", bedflow::test::submit}, {"queue", bedflow::test::queue}, {"statistics", bedflow::test::statistics}};
+  const std::map<std::string, std::function<void()>> parts = {{"submit", bedflow::test::submit},
+                                                              {"queue", bedflow::test::queue},
+                                                              {"statistics", bedflow::test::statistics},
+                                                              {"watchers", bedflow::test::watchers}};
   std::vector<std::string> wanted(argv + 1, argv + argc);
-  if (wanted.empty()) wanted = {"submit", "queue", "statistics"};
+  if (wanted.empty()) wanted = {"submit", "queue", "statistics", "watchers"};
   try {
     for (const auto& part : wanted) parts.at(part)();
   } catch (const std::exception& failure) {
