@@ -27,7 +27,7 @@ class Decomposition {
  public:
   // The low corner of the box is at the origin.
   Decomposition(Comm comm, Vec3 size, std::array<bool, 3> periodic, Cuts cuts);
-  Decomposition(Comm comm, Int3 cells, Vec3 size, std::array<bool, 3> periodic, int tall = -1, Int3 narrowest = {1, 1, 1})
+  Decomposition(const Comm& comm, Int3 cells, Vec3 size, std::array<bool, 3> periodic, int tall = -1, Int3 narrowest = {1, 1, 1})
       : Decomposition(comm, size, periodic, even_cuts(comm.size(), cells, size, tall, narrowest)) {}
 
   const Comm& comm() const { return comm_; }

@@ -67,8 +67,8 @@ struct Extreme {
   End end = End::runs;
   std::string word = {};  // in the message of a refusal or a stop
 };
-void PrintTo(const Extreme& extreme, std::ostream* out) {
-  *out << extreme.name;
+std::ostream& operator<<(std::ostream& out, const Extreme& extreme) {
+  return out << extreme.name;
 }
 
 bool finite(Vec3 v) {
