@@ -65,10 +65,9 @@ TEST(Baffles, ThrowParticlesBack) {
   text = with(text, "faces {", "panels { low { x: 0.0075 } high { x: 0.0075 y: 0.036 z: 0.01 } baffle {} } faces {");
   text = with(text, "velocity: 0.9", "velocity: 0.1");
   const std::size_t from = text.find("random {"), to = text.find("spring {");
-  text.replace(
-      from, to - from,
-      "placed { spheres { position { x: 0.005 y: 0.02 z: 0.005 } velocity { x: 1 } } spheres { position { x: 0.01 y: "
-      "0.03 z: 0.005 } velocity { x: -1 } } } ");
+  text.replace(from, to - from,
+               "placed { spheres { position { x: 0.005 y: 0.02 z: 0.005 } velocity { x: 1 } } spheres { position { x: 0.01 y: "
+               "0.03 z: 0.005 } velocity { x: -1 } } } ");
   const Plan plan = make_plan(scene_of(world, text), world.size());
   PhaseTimer timer;
   Simulation simulation(plan, world, timer);
