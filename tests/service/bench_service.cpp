@@ -111,6 +111,7 @@ void queue() {
   Bench bench;
   const auto begin = Clock::now();
   std::vector<std::thread> threads;
+  threads.reserve(clients);
   std::vector<double> times(jobs);
   for (int client = 0; client < clients; ++client) {
     threads.emplace_back([&, client] {
@@ -193,8 +194,8 @@ void statistics() {
     return time;
   };
   const double first = ask();
-  std::vector<double> times;
-  for (int i = 0; i < 9; ++i) times.push_back(ask());
+  std::vector<double> times(9);
+  for (double& time : times) time = ask();
   report("service/statistics/million", quantile(times, 0.5), "ms", text_of("thinned to 2000; the first time %.3g ms", first));
 }
 

@@ -171,7 +171,7 @@ class NewFiles {
       const auto got = ::read(inotify_, buffer.data(), buffer.size());
       for (std::ptrdiff_t place = 0; place < got;) {
         const auto* event = reinterpret_cast<const inotify_event*>(buffer.data() + place);
-        if (const std::string name = event->len > 0 ? event->name : ""; attempt_of_partial(name)) return name;
+        if (std::string name = event->len > 0 ? event->name : ""; attempt_of_partial(name)) return name;
         place += static_cast<std::ptrdiff_t>(sizeof(inotify_event) + event->len);
       }
     }

@@ -88,8 +88,9 @@ TEST_F(Crowd, AClientThatIsStoppedIsLetGo) {
     return std::distance(begin(all), end(all));
   };
   const auto before = descriptors();
-  const pid_t client = server::launch(
-      {.command = {BEDFLOW_BIN_DIR "/bedflow", "watch", blocker_, "--server", server_.address()}, .environment = {}});
+  const std::string program = BEDFLOW_BIN_DIR "/bedflow";
+  const pid_t client =
+      server::launch({.command = {program, "watch", blocker_, "--server", server_.address()}, .environment = {}});
   ASSERT_TRUE(holds_within(20s, [&] { return descriptors() > before; }));
   ::kill(client, SIGSTOP);
   EXPECT_TRUE(holds_within(90s, [&] { return descriptors() == before; }));
@@ -104,6 +105,7 @@ TEST_F(Crowd, JobsOfManyClientsAreListedOnceEachWhileMoreArrive) {
   std::mutex mutex;
   std::set<std::string> acknowledged = {blocker_};
   std::vector<std::thread> threads;
+  threads.reserve(clients);
   for (int client = 0; client < clients; ++client) {
     threads.emplace_back([&, client] {
       for (int i = client; i < count; i += clients) {

@@ -161,7 +161,7 @@ class FullDisk : private DiskHolder, public testing::Test {
   grpc::Status submit(const v1::CreateJobRequest& request) {
     grpc::ClientContext context;
     v1::CreateJobResponse response;
-    const auto status = server_.stub().CreateJob(&context, request, &response);
+    auto status = server_.stub().CreateJob(&context, request, &response);
     if (status.ok()) acknowledged_.insert(response.job().id());
     return status;
   }

@@ -65,7 +65,7 @@ inline v1::CreateJobRequest bed(std::uint32_t ranks, double end) {
 
 class RealEngine : public testing::Test {
  protected:
-  explicit RealEngine(std::vector<std::string> arguments = {}, std::filesystem::path data = {})
+  explicit RealEngine(std::vector<std::string> arguments = {}, const std::filesystem::path& data = {})
       : server_(BEDFLOW_BIN_DIR "/bedflowd", data.empty() ? folder_.path() / "data" : data, BEDFLOW_BIN_DIR "/bedflow-engine",
                 std::move(arguments)) {}
 

@@ -202,8 +202,8 @@ TEST(Process, OneThatSaysTooMuchIsKilled) {
 // A process may end between the opening and the reading of its files, which then fails.
 TEST(Process, OnesThatEndWhileTheyAreLookedAtAreGone) {
   for (int round = 0; round < 20; ++round) {
-    std::vector<pid_t> children;
-    for (int i = 0; i < 20; ++i) children.push_back(server::launch({.command = {"true"}, .environment = {}}));
+    std::vector<pid_t> children(20);
+    for (pid_t& child : children) child = server::launch({.command = {"true"}, .environment = {}});
     std::jthread reaper([&] {
       for (const pid_t child : children) server::wait_for_exit(child);
     });
