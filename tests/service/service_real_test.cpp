@@ -148,9 +148,10 @@ class RealFaults : public RealEngine {
 
 // One job, and each time it has come to a new checkpoint another fault.
 TEST_F(RealFaults, AJobThatMeetsThemAllEndsWithTheBitsOfOneThatMetNone) {
-  const auto undisturbed = submit(bed(2, 0.03));
+  const double long_enough = 0.1 * trials(2, 4);  // simulated s: the ranks outlive a killed mpirun by a second or two
+  const auto undisturbed = submit(bed(2, long_enough));
   ASSERT_EQ(wait_for(undisturbed, v1::SUCCEEDED).state(), v1::SUCCEEDED) << logs(undisturbed);
-  const auto id = submit(bed(2, 0.03));
+  const auto id = submit(bed(2, long_enough));
   struct Fault {
     const char* what;
     int signal;
