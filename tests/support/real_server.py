@@ -1,6 +1,7 @@
 """A real bedflowd with the real engine in a folder of its own, and small beds, for tests in Python."""
 import os
 import pathlib
+import shutil
 import signal
 import subprocess
 import tempfile
@@ -58,8 +59,7 @@ class RealServer:
     """Started at once; use it in a with statement."""
 
     def __init__(self, *options):
-        self._folder = tempfile.TemporaryDirectory(prefix="bedflow-")
-        self.path = pathlib.Path(self._folder.name)
+        self.path = pathlib.Path(tempfile.mkdtemp(prefix="bedflow-"))
         self._options = options
         self.address = f"unix:{self.path}/data/bedflowd.sock"
         self.process = None
@@ -72,7 +72,9 @@ class RealServer:
         self.process.send_signal(signal.SIGTERM)
         self.process.wait(20)
         self.process.stdout.close()
-        self._folder.cleanup()
+        # Engines outlive their server and go on writing until they miss their folders.
+        if not wait_until(lambda: shutil.rmtree(self.path, ignore_errors=True) or not self.path.exists()):
+            raise RuntimeError(f"{self.path} is written to again and again")
 
     def start(self):
         with open(self.path / "server.log", "ab") as log:
