@@ -165,10 +165,13 @@ bool LogReader::read_up_to(std::size_t most, const std::function<void(const LogR
   }
   std::size_t taken = 0;
   LogRecord record;  // its memory serves all
+  const auto is_next = [&](std::string_view bytes) {
+    return is_sound(bytes) && number_at<std::uint64_t>(bytes, 8) == next_sequence_;
+  };
   for (std::size_t chunk = chunk_bytes;;) {
     const std::string bytes = bytes_at(file.get(), offset_, chunk, path_);
     std::string_view rest = bytes;
-    while (is_sound(rest) && number_at<std::uint64_t>(rest, 8) == next_sequence_) {
+    while (is_next(rest)) {
       if (taken++ == most) return true;
       const std::size_t size = *record_bytes(rest);
       record.type = number_at<std::uint32_t>(rest, 4);
@@ -185,7 +188,9 @@ bool LogReader::read_up_to(std::size_t most, const std::function<void(const LogR
         bytes.size() == chunk && (!size || (*size > rest.size() && *size <= header_bytes + most_payload_bytes));
     if (!may_go_on) {                    // torn or damaged
       if (is_sound(rest)) return false;  // whole, but with a number out of turn
-      return !later_record_follows(bytes_at(file.get(), offset_, most_payload_bytes, path_), next_sequence_);
+      const std::string all = bytes_at(file.get(), offset_, most_payload_bytes, path_);
+      if (is_next(all)) continue;  // it was being written
+      return !later_record_follows(all, next_sequence_);
     }
     chunk = std::max(chunk_bytes, size.value_or(0));
   }

@@ -44,9 +44,7 @@ class Crowd : public ServiceTest {
   std::string blocker_;
 };
 
-// By -L long only: now and then a watch of a long history ends before its job does, for a reason that is still to be found.
 TEST_F(Crowd, AReaderThatLagsIsSparedTheProgressThatIsOvertakenAndNothingElse) {
-  if (!std::getenv("BEDFLOW_LONG")) GTEST_SKIP() << "by -L long";
   occupy();
   const auto id = submit(job_of(20'000, "step_ms=0"));
   Watching slow(server_.address(), id, 1, 1);

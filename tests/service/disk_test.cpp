@@ -125,10 +125,7 @@ TEST_F(RealFullDisk, LetsTheRunGoOnWhereThePolicySaysSoAndNothingItReportsIsMiss
   EXPECT_THAT(warnings, testing::HasSubstr("no checkpoint of step"));
 }
 
-// By -L long only: about once in twenty runs beside others its last watch has ended while the job was SUSPENDING, for a reason
-// that is still to be found (the job itself was suspended well).
 TEST_F(RealFullDisk, ThatFillsUpInTheMiddleOfAWriteNeverEndsTheEngine) {
-  if (trials(0, 1) == 0) GTEST_SKIP() << "by -L long";
   auto request = checkpointed_bed(v1::CheckpointPolicy::GO_ON, 1000);
   request.mutable_spec()->mutable_checkpoints()->clear_every_simulated_seconds();
   request.mutable_spec()->mutable_checkpoints()->set_every_steps(1);

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <random>
 #include <system_error>
+#include <thread>
 
 namespace bedflow {
 namespace {
@@ -163,6 +164,20 @@ TEST_F(RecordLog, FullDiskLeavesWholeRecords) {
   std::signal(SIGXFSZ, handler);
   EXPECT_EQ(writer.append(0, "room again"), 2U);
   EXPECT_EQ(payloads(), (std::vector<std::string>{std::string(1000, 'a'), "room again"}));
+}
+
+// A reader may see a part of a record, and whole ones behind it a moment later: that is no damage.
+TEST_F(RecordLog, IsReadWhileItIsWritten) {
+  constexpr std::size_t records = 20'000;
+  std::jthread writer([&] {
+    LogWriter log(path_);
+    for (std::size_t i = 0; i < records; ++i) log.append(1, std::string(i % 5000, 'x'));
+  });
+  LogReader reader(path_);
+  std::size_t last = 0;
+  while (last < records) {
+    ASSERT_TRUE(reader.read([&](const LogRecord& record) { EXPECT_EQ(record.sequence, ++last); })) << "behind " << last;
+  }
 }
 
 }  // namespace
