@@ -44,6 +44,7 @@ int run(int argc, char** argv) {
   add_result_verbs(app, program);
   add_field_verbs(app, program);
   add_checkpoint_verbs(app, program);
+  add_study_verbs(app, program);
   add_server_verbs(app, program);
   try {
     app.parse(argc, argv);

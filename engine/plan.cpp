@@ -61,7 +61,7 @@ double drag_limit(const Scene& scene) {
 void plan_time(Plan& plan) {
   const Scene& scene = plan.scene;
   const double tau = scene.particles ? scene.particles->collision_time : 0;
-  plan.step = scene.step.value_or(tau);
+  plan.step = scene.substeps ? *scene.substeps * tau / scene.particles->steps_per_collision : scene.step.value_or(tau);
   plan.longest_step = std::max(plan.step, scene.longest_step.value_or(plan.step));
   if (scene.particles) {
     plan.substep = std::min(plan.step, tau / scene.particles->steps_per_collision);

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <csignal>
 #include <cstdio>
+#include <ctime>
 #include <fstream>
 #include <new>
 #include <sstream>
@@ -23,6 +24,8 @@ namespace bedflow {
 
 namespace {
 
+constexpr const char* packing_name = "packing.h5";
+
 volatile std::sig_atomic_t signal_checkpoint = 0, signal_stop = 0;
 
 void listen_to_signals() {
@@ -31,11 +34,19 @@ void listen_to_signals() {
   std::signal(SIGINT, [](int) { signal_stop = 1; });
 }
 
+// Of this process, all its threads.
+double cpu_seconds() {
+  timespec now{};
+  ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
 // The scene with steps and sub-steps halved so many times.
 Scene halved(Scene scene, int halvings, int ranks) {
   if (halvings == 0) return scene;
   const double factor = std::ldexp(1.0, -halvings);
   scene.step = factor * make_plan(scene, ranks).step;
+  scene.substeps.reset();
   if (scene.longest_step) *scene.longest_step *= factor;
   if (scene.shortest_step) scene.shortest_step = std::min(*scene.shortest_step, *scene.step);
   if (scene.particles) scene.particles->steps_per_collision /= factor;
@@ -74,21 +85,29 @@ void Run::start() {
   scene_ = read_scene(options_.folder / "case.txtpb");
   plan_with(0);
   const std::string from = begin();
+  const bool packed = from == packing_name;
   folder_.started(comm_.size(), simulation_->steps(), simulation_->time(), plan_.scene.end_time, from, plan_.text());
   for (const std::string& warning : plan_.warnings) folder_.warning(warning);
   for (const std::string& fault : checkpoint_faults_) folder_.warning(fault);
   report_schema();
-  if (!from.empty()) {
+  if (!from.empty() && !packed) {
     folder_.statistics_resumed(simulation_->steps());
+    begin_totals();
     return;
   }
   folder_.statistics_resumed(0);  // an earlier attempt that never got to a checkpoint is void
-  settle();
+  if (!packed) settle();
   balance();
-  timer_ = PhaseTimer();  // the summary is of the steps
+  begin_totals();
   monitors_->observe(simulation_->observation(), 0, 0, 0);
   write_plots();
   write_checkpoint_now();  // settling is never done twice
+}
+
+// The summary is of the steps.
+void Run::begin_totals() {
+  timer_ = PhaseTimer();
+  totals_.cpu_seconds = -cpu_seconds();
 }
 
 // The plan of the case, its steps halved so many times.
@@ -98,7 +117,8 @@ void Run::plan_with(int halvings) {
   monitors_ = std::make_unique<Monitors>(StatisticScene{plan_.scene.size, plan_.cells}, plan_.scene.monitors, sink());
 }
 
-// Takes up the newest good checkpoint, or the one asked for, and says its name; else the state at time 0.
+// Takes up the newest good checkpoint, or the one asked for, and says its name; else the state at time 0, of the packing that the
+// folder may have.
 std::string Run::begin() {
   const auto checkpoints = options_.folder / "checkpoints";
   std::optional<CheckpointInfo> found;
@@ -115,9 +135,14 @@ std::string Run::begin() {
   }
   if (!found) {
     simulation_ = std::make_unique<Simulation>(plan_, comm_, timer_);
-    simulation_->seed();
+    const auto packing = options_.folder / packing_name;
+    const bool packed = comm_.any(comm_.root() && std::filesystem::exists(packing));
+    if (packed)
+      simulation_->seed_from(CheckpointReader(comm_, packing));
+    else
+      simulation_->seed();
     balance();
-    return "";
+    return packed ? packing_name : "";
   }
   const CheckpointReader reader(comm_, found->path);
   if (reader.has_number("guard/halvings") && reader.number("guard/halvings") > halvings_) {
@@ -232,6 +257,7 @@ void Run::finish(Stop& outcome) {
   const double time = simulation_ ? simulation_->time() : 0;
   if (simulation_) {
     totals_.reason = outcome.reason;
+    totals_.cpu_seconds += cpu_seconds();
     totals_.settling_seconds = settling_seconds_;
     totals_.particles = simulation_->particle_count();
     totals_.turnover = simulation_->turnover();

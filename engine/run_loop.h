@@ -31,6 +31,7 @@ class Run {
   void start();
   void plan_with(int halvings);
   std::string begin();
+  void begin_totals();
   void settle();
   Stop advance_to_end();
   bool go_back(const Stop& trouble);

@@ -82,7 +82,8 @@ struct Scene {
   std::optional<CouplingScene> coupling;
   std::vector<Wall> walls;              // within the box
   double end_time = 0;                  // s
-  std::optional<double> step;           // dt_CFD at the start, s; τ if absent
+  std::optional<double> step;           // dt_CFD at the start, s; τ if neither this nor substeps is there
+  std::optional<int> substeps;          // the same in sub-steps of the particles
   std::optional<double> longest_step;   // s; as step if absent
   std::optional<double> shortest_step;  // s; step/1000 if absent
   std::optional<double> courant;        // Σ|U|dt/h, at most

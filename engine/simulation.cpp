@@ -209,20 +209,27 @@ std::vector<std::string> Simulation::take_notes() {
 // ------------------------------------------------------------------------------------------------ begin
 
 void Simulation::seed() {
-  if (gas_) {
-    GasState& gas = gas_->state;
-    for (int d = 0; d < 3; ++d) gas.velocity[d].fill(plan_.scene.gas->initial_velocity[d]);
-    gas_->solver.prepare(gas, 0);
-  }
+  begin_gas();
   if (dem_) {
     const ParticleScene& particles = *plan_.scene.particles;
     const std::vector<PlacedSphere> spheres = seed_spheres(particles.kinds, particles.regions);
-    dem_->set_particles(keep_owned(decomposition_, dem_->setup(), spheres));
-    next_id_ = static_cast<std::int64_t>(spheres.size());
-    turnover_.initial = present();
-    particle_count_ = turnover_.initial.count;
+    begin_particles(keep_owned(decomposition_, dem_->setup(), spheres), static_cast<std::int64_t>(spheres.size()));
   }
   if (coupling_) coupling_->transfer.deposit_volume(dem_->particles(), gas_->state.fraction);
+}
+
+void Simulation::begin_gas() {
+  if (!gas_) return;
+  GasState& gas = gas_->state;
+  for (int d = 0; d < 3; ++d) gas.velocity[d].fill(plan_.scene.gas->initial_velocity[d]);
+  gas_->solver.prepare(gas, 0);
+}
+
+void Simulation::begin_particles(ParticleStore particles, std::int64_t next_id) {
+  dem_->set_particles(std::move(particles));
+  next_id_ = next_id;
+  turnover_.initial = present();
+  particle_count_ = turnover_.initial.count;
 }
 
 bool Simulation::settle() {

@@ -28,6 +28,9 @@ class Simulation {
 
   // The state at time 0: gas at rest or as the case says, particles at their places. Throws Stop(invalid_case).
   void seed();
+  // The same with the particles of a checkpoint, of a case with the same box and sizes, as they lie and move: what they felt and
+  // remembered is left behind. Any number of ranks. Throws Stop(invalid_case).
+  void seed_from(const CheckpointSource& packing);
   // Lets seeded particles fall for some sub-steps, without gas and with the settling's own restitution. False: they are at rest,
   // or no settling was asked for, or its time is over.
   bool settle();
@@ -104,6 +107,12 @@ class Simulation {
   void put_contacts(CheckpointContent& content) const;
   void put_turnover(CheckpointContent& content) const;
   void restore_turnover(const CheckpointSource& from);
+  void begin_gas();
+  void begin_particles(ParticleStore particles, std::int64_t next_id);
+  static void require_same(const CheckpointSource& from, const std::string& name, const std::string& field, double here);
+  void require_same_box(const CheckpointSource& from) const;
+  void require_same_particles(const CheckpointSource& from) const;
+  ParticleStore particles_of(const CheckpointSource& from) const;
   void restore_gas(const CheckpointSource& from);
   void restore_particles(const CheckpointSource& from);
 

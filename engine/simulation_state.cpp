@@ -4,6 +4,7 @@
 #include <cmath>
 #include <set>
 
+#include "base/short_number.h"
 #include "particles/migration.h"
 #include "simulation.h"
 
@@ -209,24 +210,35 @@ void Simulation::put_contacts(CheckpointContent& content) const {
   content.arrays.push_back(rows("contacts/wall_angle", "rad", "rolling angle θ as the particle sees it", wall_angles));
 }
 
-void Simulation::restore(const CheckpointSource& from) {
-  const auto same = [&](const char* name, const char* field, double here) {
-    const double there = from.number(name);
-    if (std::abs(there - here) > 1e-12 * std::abs(here)) {
-      throw Stop(Reason::invalid_case, std::string("the checkpoint is of another scene: ") + field + " is " +
-                                           std::to_string(there) + " there and " + std::to_string(here) + " in the case");
-    }
-  };
+void Simulation::require_same(const CheckpointSource& from, const std::string& name, const std::string& field, double here) {
+  const double there = from.number(name);
+  if (std::abs(there - here) <= 1e-12 * std::abs(here)) return;
+  throw Stop(Reason::invalid_case, "the checkpoint is of another scene: " + field + " is " + short_number(there) +
+                                       " there and " + short_number(here) + " in the case");
+}
+
+void Simulation::require_same_box(const CheckpointSource& from) const {
   for (int d = 0; d < 3; ++d) {
     const std::string axis(1, "xyz"[d]);
-    same(("domain/size_" + axis).c_str(), ("domain.size." + axis).c_str(), plan_.scene.size[d]);
-    same(("cells/" + axis).c_str(), ("domain.cells." + axis).c_str(), plan_.scene.cells[d]);
+    require_same(from, "domain/size_" + axis, "domain.size." + axis, plan_.scene.size[d]);
+  }
+}
+
+void Simulation::require_same_particles(const CheckpointSource& from) const {
+  require_same(from, "particles/diameter", "the largest diameter", plan_.scene.particles->largest());
+  require_same(from, "particles/types", "the number of types", static_cast<double>(dem_->setup().types.size()));
+}
+
+void Simulation::restore(const CheckpointSource& from) {
+  require_same_box(from);
+  for (int d = 0; d < 3; ++d) {
+    const std::string axis(1, "xyz"[d]);
+    require_same(from, "cells/" + axis, "domain.cells." + axis, plan_.scene.cells[d]);
   }
   if (from.has("gas/pressure") != static_cast<bool>(gas_) || from.has("particles/position") != static_cast<bool>(dem_)) {
     throw Stop(Reason::invalid_case, "the checkpoint is of another scene: gas and particles must be there in both or in neither");
   }
-  if (dem_) same("particles/diameter", "the largest diameter", plan_.scene.particles->largest());
-  if (dem_) same("particles/types", "the number of types", static_cast<double>(dem_->setup().types.size()));
+  if (dem_) require_same_particles(from);
   steps_ = from.step();
   time_ = from.time();
   controller_.restore(from.number("controller/step_size"), static_cast<int>(from.number("controller/good_steps")));
@@ -250,8 +262,24 @@ void Simulation::restore_gas(const CheckpointSource& from) {
   if (coupling_) coupling_->transfer.mirror_at_faces(gas.fraction);
 }
 
-void Simulation::restore_particles(const CheckpointSource& from) {
-  const bool same_blocks = blocks_of(from, decomposition_.comm()) == decomposition_.cuts();
+void Simulation::seed_from(const CheckpointSource& packing) {
+  if (!dem_ || !packing.has("particles/position")) {
+    throw Stop(Reason::invalid_case, dem_ ? "the checkpoint whose packing is to be taken has no particles"
+                                          : "the case has no particles to take from a packing");
+  }
+  require_same_box(packing);
+  require_same_particles(packing);
+  begin_gas();
+  ParticleStore store = particles_of(packing);
+  store.each_array(dem_->setup(), [&](auto& array) { array.resize(store.owned); });
+  const std::int64_t highest = store.owned ? *std::ranges::max_element(store.id) : -1;
+  const auto next_id = static_cast<std::int64_t>(decomposition_.comm().max(static_cast<double>(highest))) + 1;
+  begin_particles(redistribute(decomposition_, dem_->setup(), std::move(store)), next_id);
+  if (coupling_) coupling_->transfer.deposit_volume(dem_->particles(), gas_->state.fraction);
+}
+
+// Places, velocities and kinds, as the ranks of now read them.
+ParticleStore Simulation::particles_of(const CheckpointSource& from) const {
   ParticleStore store;
   const std::vector<Vec3> positions = vectors(from.rows("particles/position"));
   const std::vector<Vec3> velocities = vectors(from.rows("particles/velocity"));
@@ -263,6 +291,13 @@ void Simulation::restore_particles(const CheckpointSource& from) {
   const auto radii = setup.distributed() ? from.rows("particles/radius") : std::vector<double>(ids.size());
   for (std::size_t p = 0; p < ids.size(); ++p)
     store.add(setup, ids[p], positions[p], velocities[p], spins[p], static_cast<int>(types[p]), radii[p]);
+  return store;
+}
+
+void Simulation::restore_particles(const CheckpointSource& from) {
+  const bool same_blocks = blocks_of(from, decomposition_.comm()) == decomposition_.cuts();
+  const DemSetup& setup = dem_->setup();
+  ParticleStore store = particles_of(from);
   if (setup.gas == GasForce::relaxed) {
     store.gas_force.resize(store.owned);
     store.gas_response.resize(store.owned);

@@ -14,11 +14,12 @@ namespace {
 using nlohmann::json;
 
 // What this rank tells: the seconds of each phase, then the rest by name.
-enum Told { wall = phase_count, in_steps, communication, messages, bytes, told };
+enum Told { wall = phase_count, cpu, in_steps, communication, messages, bytes, told };
 std::array<double, told> costs_of(const PhaseTimer& timer, const RunTotals& totals) {
   std::array<double, told> costs{};
   for (int phase = 0; phase < phase_count; ++phase) costs[phase] = timer[static_cast<Phase>(phase)].seconds;
   costs[wall] = timer.seconds();
+  costs[cpu] = totals.cpu_seconds;
   costs[in_steps] = totals.step_seconds;
   costs[communication] = totals.traffic.seconds;
   costs[messages] = static_cast<double>(totals.traffic.messages);
@@ -89,7 +90,7 @@ void write_summary(const Comm& comm, const std::filesystem::path& path, const Pl
   const auto particle_substeps = static_cast<double>(totals.particle_substeps),
              cell_steps = static_cast<double>(totals.cell_steps);
   const double particle_steps = static_cast<double>(totals.particle_steps);
-  double gas = 0, transfer = 0, dem = 0, busy = 0, steps = 0, talk = 0, most_work = 0;
+  double gas = 0, transfer = 0, dem = 0, busy = 0, cpu_seconds = 0, steps = 0, talk = 0, most_work = 0;
   json phases, ranks = json::array();
   for (int rank = 0; rank < comm.size(); ++rank) {
     const double* costs = all.data() + rank * mine.size();
@@ -97,13 +98,14 @@ void write_summary(const Comm& comm, const std::filesystem::path& path, const Pl
                      {"communication_seconds", costs[communication]},
                      {"messages", costs[messages]},
                      {"message_bytes", costs[bytes]}});
+    cpu_seconds += costs[cpu];
     steps += costs[in_steps];
     talk += costs[communication];
     most_work = std::max(most_work, costs[in_steps] - costs[communication]);
   }
   for (int p = 0; p < phase_count; ++p) {
     const Phase phase = static_cast<Phase>(p);
-    double seconds = 0;  // CPU seconds, all ranks
+    double seconds = 0;  // all ranks
     for (int rank = 0; rank < comm.size(); ++rank) {
       const double share = all[rank * mine.size() + p];
       seconds += share;
@@ -120,6 +122,7 @@ void write_summary(const Comm& comm, const std::filesystem::path& path, const Pl
                   {"exit_code", static_cast<int>(totals.reason)},
                   {"ranks", comm.size()},
                   {"wall_seconds", timer.seconds()},
+                  {"cpu_seconds", cpu_seconds},
                   {"settling_seconds", totals.settling_seconds},
                   {"simulated_seconds", totals.simulated_seconds},
                   {"steps", totals.steps},
@@ -142,7 +145,7 @@ void write_summary(const Comm& comm, const std::filesystem::path& path, const Pl
   if (steps > talk) summary["balance"] = most_work * comm.size() / (steps - talk);
   if (busy > 0) summary["gas_share"] = gas / busy;
   if (busy > 0) summary["transfer_share"] = transfer / busy;
-  if (totals.simulated_seconds > 0) summary["cpu_seconds_per_simulated_second"] = busy / totals.simulated_seconds;
+  if (totals.simulated_seconds > 0) summary["cpu_seconds_per_simulated_second"] = cpu_seconds / totals.simulated_seconds;
 
   const std::filesystem::path partial = path.string() + ".partial";
   std::ofstream file(partial);

@@ -18,6 +18,7 @@ struct RunTotals {
   std::uint64_t steps = 0, substeps = 0;  // of this attempt
   double simulated_seconds = 0;           // of this attempt
   double settling_seconds = 0;            // wall, before the steps
+  double cpu_seconds = 0;                 // of this rank since the first step, checkpoints and output with it
   std::uint64_t particle_steps = 0;       // all ranks
   std::uint64_t particle_substeps = 0;    // all ranks
   std::uint64_t cell_steps = 0;           // all ranks
@@ -32,7 +33,7 @@ struct RunTotals {
   Traffic traffic;                // of this rank in steps
 };
 
-// Collective; rank 0 writes. Wall seconds, steps, sub-steps, and seconds and nanoseconds per unit of work of every phase, per
+// Collective; rank 0 writes. Wall and CPU seconds, steps, sub-steps, and seconds and nanoseconds per unit of work of every phase, per
 // rank and in total (the ranks' mean); the share of communication (waiting included) in the steps, and their balance: the work of
 // the busiest rank over the ranks' mean, where work is what is not communication. Throws std::system_error on rank 0.
 void write_summary(const Comm& comm, const std::filesystem::path& path, const Plan& plan, const PhaseTimer& timer,

@@ -27,7 +27,10 @@ void check_parts(const v1::Case& value, CaseFaults& faults) {
 void check_time(const v1::Case& value, CaseFaults& faults) {
   const v1::Time& time = value.time();
   if (!value.has_time()) return;
-  if (!time.has_step() && !value.has_particles()) {
+  if (time.has_substeps() && (time.has_step() || !value.has_particles())) {
+    faults.push_back({"time.substeps", time.has_step() ? "is set, and so is time.step: remove one of the two"
+                                                       : "is set, but the case has no particles: set time.step in s"});
+  } else if (!time.has_step() && !value.has_particles()) {
     faults.push_back(
         {"time.step", "is missing: without particles there is no collision time to take it from; set the gas step in s"});
   }

@@ -18,22 +18,21 @@
 #include "submission.h"
 
 namespace bedflow::server {
-namespace {
 
-namespace fs = std::filesystem;
-
-// The same request gives the same bytes: maps in order.
-std::string content_of(v1::CreateJobRequest request) {
-  request.clear_request_id();
+std::string content_of(const google::protobuf::Message& message) {
   std::string bytes;
   {
     google::protobuf::io::StringOutputStream stream(&bytes);
     google::protobuf::io::CodedOutputStream coded(&stream);
     coded.SetSerializationDeterministic(true);
-    request.SerializeToCodedStream(&coded);
+    message.SerializeToCodedStream(&coded);
   }
   return bytes;
 }
+
+namespace {
+
+namespace fs = std::filesystem;
 
 // The folder as it is before the first attempt, durable.
 void write_folder(const JobFolder& folder, const std::string& text, const v1::JobSpec& spec) {
@@ -68,9 +67,13 @@ void Jobs::start_from(v1::CreateJobRequest& request, JobRecord& record) const {
   const auto& source = request.start_from();
   const JobRecord found = record_of(source.job());
   const auto folder = folder_of(source.job());
-  record.from_step = existing_step(folder, source.job(), source.has_step() ? std::optional(source.step()) : std::nullopt);
+  const auto step = existing_step(folder, source.job(), source.has_step() ? std::optional(source.step()) : std::nullopt);
   record.job.set_start_from_job(source.job());
-  record.job.set_start_from_step(*record.from_step);
+  record.job.set_start_from_step(step);
+  if (request.packing_only())
+    record.job.set_packing_only(true);
+  else
+    record.from_step = step;
   const v1::Case before = case_of(found);
   if (!request.has_case_()) *request.mutable_case_() = before;
   for (const auto& difference : differences(before, request.case_())) {
@@ -95,10 +98,12 @@ v1::Case Jobs::read_case(const std::string& id) {
 }
 
 v1::CreateJobResponse Jobs::create(const v1::CreateJobRequest& asked) {
-  const std::string content = content_of(asked);
   v1::CreateJobRequest request = asked;
+  request.clear_request_id();
+  const std::string content = content_of(request);
+  request.set_request_id(asked.request_id());
   JobRecord record;
-  if (request.has_request_id() && !is_request_id(request.request_id())) {
+  if (asked.has_request_id() && !is_request_id(request.request_id())) {
     throw Refusal(Refused::bad_request,
                   "request_id '" + printable(request.request_id()) + "' is not of the form [A-Za-z0-9-]{8,64}");
   }
@@ -106,6 +111,9 @@ v1::CreateJobResponse Jobs::create(const v1::CreateJobRequest& asked) {
     const std::lock_guard guard(mutex_);
     if (auto earlier = earlier_answer(request, content)) return *earlier;
     if (request.has_start_from()) start_from(request, record);
+  }
+  if (request.packing_only() && !request.has_start_from()) {
+    throw Refusal(Refused::bad_request, "packing_only needs start_from: whose particles?", "bedflow submit CASE --packing-of JOB");
   }
   if (!request.has_case_())
     throw Refusal(Refused::bad_request, "the request has neither a case nor start_from", "bedflow init mueller");
@@ -130,14 +138,16 @@ v1::CreateJobResponse Jobs::commit(JobRecord& record, const v1::CreateJobRequest
   record.job.set_changed_unix_nanos(record.job.created_unix_nanos());
   std::optional<DraftFolder> draft;
   if (imported) write_folder(*imported, case_text(request.case_()), request.spec());
-  if (record.from_step) {
+  if (record.job.has_start_from_job()) {
     const JobFolder& folder = draft.emplace(settings_.data / "drafts" / record.job.id()).folder;
     write_folder(folder, case_text(request.case_()), request.spec());
-    const auto from = folder_of(record.job.start_from_job()).checkpoint(*record.from_step);
+    const auto step = record.job.start_from_step();
+    const auto from = folder_of(record.job.start_from_job()).checkpoint(step);
+    const auto to = record.from_step ? folder.checkpoint(step) : folder.packing();
     std::error_code failed;
-    fs::create_hard_link(from, folder.checkpoint(*record.from_step), failed);
-    if (failed) fs::copy_file(from, folder.checkpoint(*record.from_step));
-    sync_folder(folder.checkpoints());
+    fs::create_hard_link(from, to, failed);
+    if (failed) fs::copy_file(from, to);
+    sync_folder(to.parent_path());
   }
   const std::lock_guard guard(mutex_);
   if (auto earlier = earlier_answer(request, content)) return *earlier;  // a retry has overtaken us

@@ -20,6 +20,8 @@ class JobFolder {
 
   const std::filesystem::path& root() const { return root_; }
   std::filesystem::path case_file() const { return root_ / "case.txtpb"; }
+  std::filesystem::path packing() const { return root_ / "packing.h5"; }
+  std::filesystem::path summary() const { return root_ / "summary.json"; }
   std::filesystem::path spec() const { return root_ / "job.txtpb"; }
   std::filesystem::path events() const { return root_ / "events.log"; }
   std::filesystem::path statistics() const { return root_ / "statistics.log"; }

@@ -33,6 +33,9 @@ struct Settings {
 
 std::int64_t now_nanos();  // since the epoch of Unix
 
+// Equal messages give equal bytes: maps in order.
+std::string content_of(const google::protobuf::Message& message);
+
 // The checkpoint of the step, or the newest. Throws Refusal(checkpoint_not_found).
 std::uint64_t existing_step(const JobFolder& folder, const std::string& id, std::optional<std::uint64_t> wanted);
 

@@ -23,6 +23,7 @@
 #include "runner.h"
 #include "security.h"
 #include "service.h"
+#include "studies.h"
 #include "watch.h"
 
 namespace bedflow::server {
@@ -73,18 +74,15 @@ std::unique_ptr<grpc::Server> listen(const std::string& address, JobService& ser
   return server;
 }
 
-void supervise(Jobs& jobs, Watchers& watchers, const std::atomic<bool>& ending) {
-  auto last_round = std::chrono::steady_clock::now();
+// A round that fails (on a full disk, say) is tried again a second later.
+void supervise(const std::function<void()>& round, const std::atomic<bool>& ending) {
   while (!ending) {
     try {
-      watchers.wake(jobs.advance());
-    } catch (const std::exception& failure) {  // a full disk, say: tried again in the next round
+      round();
+    } catch (const std::exception& failure) {
       spdlog::error("{}", failure.what());
       std::this_thread::sleep_for(1s);
     }
-    if (std::chrono::steady_clock::now() - last_round < 500ms) continue;
-    last_round = std::chrono::steady_clock::now();
-    watchers.wake_all();
   }
 }
 
@@ -110,9 +108,10 @@ void wait_for_end(const sigset_t& signals, const std::function<bool()>& has_noth
   take_folder(data);
   std::string address = listen_address(options.listen);
   Jobs jobs(options.settings);
+  Studies studies(jobs, data / "studies");
   Watchers watchers(std::chrono::milliseconds(static_cast<int>(1000 * options.bookmark_seconds)));
   Readers readers(options.reader);
-  JobService service(jobs, watchers, readers, options.settings.programs.engine, address);
+  JobService service(jobs, studies, watchers, readers, options.settings.programs.engine, address);
   int port = 0;
   const auto server = listen(address, service, port);
   if (!address.starts_with("unix:")) address = address.substr(0, address.rfind(':') + 1) + std::to_string(port);
@@ -121,10 +120,22 @@ void wait_for_end(const sigset_t& signals, const std::function<bool()>& has_noth
   std::fflush(stdout);
 
   std::atomic<bool> ending = false;
-  std::thread supervisor([&] { supervise(jobs, watchers, ending); });
+  auto last_round = std::chrono::steady_clock::now();
+  const auto attend_jobs = [&] {
+    watchers.wake(jobs.advance());
+    if (std::chrono::steady_clock::now() - last_round < 500ms) return;
+    last_round = std::chrono::steady_clock::now();
+    watchers.wake_all();
+  };
+  const auto attend_studies = [&] {
+    studies.advance();
+    std::this_thread::sleep_for(500ms);
+  };
+  std::thread supervisor([&] { supervise(attend_jobs, ending); });
+  std::thread study_supervisor([&] { supervise(attend_studies, ending); });
   const std::chrono::duration<double> patience(options.idle_seconds);
   wait_for_end(signals, [&] {
-    return options.idle_exit && service.quiet() > patience && service.calls() + watchers.count() == 0 && jobs.is_idle();
+    return options.idle_exit && service.quiet() > patience && service.calls() + watchers.count() == 0 && jobs.is_idle() && studies.is_idle();
   });
   spdlog::info("going down; what runs goes on running");
   watchers.drain();
@@ -137,6 +148,7 @@ void wait_for_end(const sigset_t& signals, const std::function<bool()>& has_noth
   ending = true;
   jobs.poke();
   supervisor.join();
+  study_supervisor.join();
   service.wait_for_calls();
   // gRPC's own end may wait 10 s for a poller of a connection that is gone. All that lasts is on the disk.
   spdlog::shutdown();

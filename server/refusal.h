@@ -15,6 +15,7 @@ enum class Refused {
   bad_request,           // another field of the request
   job_not_found,         //
   checkpoint_not_found,  //
+  study_not_found,       //
   series_not_found,      //
   wrong_state,           // the job's state does not allow it
   request_id_reused,     // the same id with another content

@@ -29,6 +29,8 @@ Code code_of(Refused why) {
       return {grpc::StatusCode::NOT_FOUND, "JOB_NOT_FOUND"};
     case Refused::checkpoint_not_found:
       return {grpc::StatusCode::NOT_FOUND, "CHECKPOINT_NOT_FOUND"};
+    case Refused::study_not_found:
+      return {grpc::StatusCode::NOT_FOUND, "STUDY_NOT_FOUND"};
     case Refused::series_not_found:
       return {grpc::StatusCode::NOT_FOUND, "SERIES_NOT_FOUND"};
     case Refused::wrong_state:

@@ -15,6 +15,7 @@
 #include "reader.h"
 #include "refusal.h"
 #include "statistics.h"
+#include "studies.h"
 #include "watch.h"
 
 namespace bedflow::server {
@@ -25,8 +26,8 @@ grpc::Status status_of_failure(const std::exception& failure);  // of a Refusal 
 
 class JobService final : public v1::JobService::CallbackService {
  public:
-  JobService(Jobs& jobs, Watchers& watchers, Readers& readers, std::filesystem::path engine, std::string address)
-      : jobs_(jobs), watchers_(watchers), readers_(readers), engine_(std::move(engine)), address_(std::move(address)) {}
+  JobService(Jobs& jobs, Studies& studies, Watchers& watchers, Readers& readers, std::filesystem::path engine, std::string address)
+      : jobs_(jobs), studies_(studies), watchers_(watchers), readers_(readers), engine_(std::move(engine)), address_(std::move(address)) {}
   ~JobService() override { wait_for_calls(); }
 
   void wait_for_calls();                              // after the gRPC server's shutdown
@@ -64,9 +65,15 @@ class JobService final : public v1::JobService::CallbackService {
   grpc::ServerReadReactor<v1::ImportCheckpointRequest>* ImportCheckpoint(Context*, v1::Job*) override;
   grpc::ServerWriteReactor<v1::FieldAnswer>* QueryField(Context*, const v1::QueryFieldRequest*) override;
   Unary* GetSnapshot(Context*, const v1::GetSnapshotRequest*, v1::Snapshot*) override;
+  Unary* CreateStudy(Context*, const v1::CreateStudyRequest*, v1::Study*) override;
+  Unary* GetStudy(Context*, const v1::GetStudyRequest*, v1::Study*) override;
+  Unary* ListStudies(Context*, const v1::ListStudiesRequest*, v1::ListStudiesResponse*) override;
+  Unary* CancelStudy(Context*, const v1::CancelStudyRequest*, v1::Study*) override;
+  Unary* DeleteStudy(Context*, const v1::DeleteStudyRequest*, v1::DeleteStudyResponse*) override;
   Unary* GetServerInfo(Context*, const v1::GetServerInfoRequest*, v1::ServerInfo*) override;
 
   Jobs& jobs_;
+  Studies& studies_;
   Watchers& watchers_;
   Readers& readers_;
   StatisticsLogs statistics_;

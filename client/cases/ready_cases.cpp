@@ -62,13 +62,8 @@ void keep_numbers(const Message& old_law, Message& new_law) {
 // Chooses the preset's arm wherever `part` has another one, so that merging then adds the rest.
 void change_laws(const Message& preset, Message& part) {
   for (int i = 0; i < part.GetDescriptor()->oneof_decl_count(); ++i) {
-    const auto* choice = part.GetDescriptor()->oneof_decl(i);
-    const FieldDescriptor* wanted = preset.GetReflection()->GetOneofFieldDescriptor(preset, choice);
-    const FieldDescriptor* present = part.GetReflection()->GetOneofFieldDescriptor(part, choice);
-    if (wanted == nullptr || present == nullptr || wanted == present) continue;
-    const std::unique_ptr<Message> old_law(part.GetReflection()->GetMessage(part, present).New());
-    old_law->CopyFrom(part.GetReflection()->GetMessage(part, present));
-    keep_numbers(*old_law, *part.GetReflection()->MutableMessage(&part, wanted));
+    const FieldDescriptor* wanted = preset.GetReflection()->GetOneofFieldDescriptor(preset, part.GetDescriptor()->oneof_decl(i));
+    if (wanted != nullptr) choose_law(part, *wanted);
   }
 }
 
@@ -83,6 +78,19 @@ void lay_over(v1::Case preset, v1::Case& value) {
 }
 
 }  // namespace
+
+void choose_law(Message& part, const FieldDescriptor& wanted) {
+  const auto* reflection = part.GetReflection();
+  const FieldDescriptor* present = reflection->GetOneofFieldDescriptor(part, wanted.containing_oneof());
+  if (present == &wanted) return;
+  std::unique_ptr<Message> old_law;
+  if (present != nullptr) {
+    old_law.reset(reflection->GetMessage(part, present).New());
+    old_law->CopyFrom(reflection->GetMessage(part, present));
+  }
+  Message& new_law = *reflection->MutableMessage(&part, &wanted);
+  if (old_law) keep_numbers(*old_law, new_law);
+}
 
 std::vector<ReadyCase> ready_cases() {
   std::vector<ReadyCase> list = listed(case_texts());

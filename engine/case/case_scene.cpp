@@ -287,6 +287,7 @@ Scene make_scene(const v1::Case& from) {
   if (from.has_coupling()) scene.coupling = coupling_scene(from.coupling());
   scene.end_time = from.time().end();
   if (from.time().has_step()) scene.step = from.time().step();
+  if (from.time().has_substeps()) scene.substeps = static_cast<int>(from.time().substeps());
   if (from.time().has_longest_step()) scene.longest_step = from.time().longest_step();
   if (from.time().has_courant()) scene.courant = from.time().courant();
   if (from.time().has_shortest_step()) scene.shortest_step = from.time().shortest_step();

@@ -129,9 +129,9 @@ GasStep::MomentumOutcome GasStep::solve_momentum(GasState& state, const Momentum
   return outcome;
 }
 
-PressureCorrection::Result GasStep::correct(GasState& state, double enough, double share) {
+PressureCorrection::Result GasStep::correct(GasState& state, double enough, double share, bool renew) {
   const PhaseTimer::Scope scope(timer, Phase::pressure, static_cast<std::uint64_t>(grid.interior()));
-  pressure.assemble(state.fraction);
+  pressure.assemble(state.fraction, renew);
   pressure.set_imbalance(state.fraction, state.velocity, state.fraction_rate);
   const double cells = static_cast<double>(grid.global[0]) * grid.global[1] * grid.global[2];
   const auto result = pressure.solve(setup.pressure_tolerance, enough / cells);

@@ -37,8 +37,8 @@ struct GasStep {
   // The same, and the velocity becomes the solution but for this share of the error; with a fault it is left anyhow.
   MomentumOutcome solve_momentum(GasState& state, const Momentum::Given& given, double leave);
   // The pressure correction, solved to setup.pressure_tolerance or Σ|imbalance| ≤ enough (m³/s), added in full to the velocity
-  // and by `share` to the pressure; wanted fluxes met; ghosts right.
-  PressureCorrection::Result correct(GasState& state, double enough, double share);
+  // and by `share` to the pressure; wanted fluxes met; ghosts right. renew: the preconditioner (pressure.h).
+  PressureCorrection::Result correct(GasState& state, double enough, double share, bool renew = true);
 
   const Decomposition& decomposition;
   const Grid& grid;

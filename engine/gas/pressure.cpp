@@ -17,7 +17,7 @@ PressureCorrection::PressureCorrection(const Decomposition& decomposition, const
       residual_(work[4]),
       row_sum_(grid.cells[0]) {}
 
-void PressureCorrection::assemble(const Field& fraction) {
+void PressureCorrection::assemble(const Field& fraction, bool renew) {
   for (int d = 0; d < 3; ++d) {
     const double half_area = 0.5 * grid_.face_area(d);
     const std::ptrdiff_t s = grid_.stride(d);
@@ -30,7 +30,7 @@ void PressureCorrection::assemble(const Field& fraction) {
     });
     halo_.fill(matrix_.coupling[d]);
   }
-  solver_.factor(matrix_);
+  if (renew) solver_.factor(matrix_);
 }
 
 void PressureCorrection::set_imbalance(const Field& fraction, const FaceField& velocity, const Field& fraction_rate) {

@@ -19,8 +19,8 @@ class PressureCorrection {
   // What a pressure difference over a face does to its velocity, m/s/Pa; 0 where none is solved. To be set before assemble, which
   // makes the equation of it and leaves ε A D in its place.
   FaceField& mobility() { return matrix_.coupling; }
-  // ε has its ghosts.
-  void assemble(const Field& fraction);
+  // ε has its ghosts. Not renewed, the preconditioner stays that of an earlier matrix, which should be much like this one.
+  void assemble(const Field& fraction, bool renew = true);
   // The right side for a velocity with its ghosts.
   void set_imbalance(const Field& fraction, const FaceField& velocity, const Field& fraction_rate);
 

@@ -6,6 +6,7 @@ namespace bedflow {
 
 GasOutcome GasStep::simple(GasState& state, const Momentum::Given& given) {
   constexpr double sweeps_leave = 0.3;  // of an error that the next iteration's coefficients change anyway
+  constexpr int renewed = 4;            // iterations for which a preconditioner is good: the coefficients change little
   GasOutcome outcome;
   double continuity = 0;  // Σ|imbalance|, m³/s, after the last correction
   const auto sound = [&](const MomentumOutcome& now) {
@@ -30,7 +31,8 @@ GasOutcome GasStep::simple(GasState& state, const Momentum::Given& given) {
     const MomentumOutcome now = solve_momentum(state, given, sweeps_leave);
     if (!sound(now)) return outcome;
     // Far below what continuity may lack: where that were left alone, pressure would stand still and momentum never settle.
-    const auto result = correct(state, 0.01 * setup.tolerance * now.sums.throughput, setup.pressure_relaxation);
+    const auto result = correct(state, 0.01 * setup.tolerance * now.sums.throughput, setup.pressure_relaxation,
+                                outcome.iterations % renewed == 0);
     outcome.pressure_iterations += result.iterations;
     continuity = result.imbalance;
   }

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
@@ -144,6 +145,48 @@ TEST_F(JobRun, BlocksFollowTheParticlesAlsoOverAResume) {
   } else {
     EXPECT_EQ(moves(through), 0);
   }
+}
+
+// The particles of a settled bed begin another case, on another grid and by another law: at their places, at time 0, with the gas
+// as that case has it.
+TEST_F(JobRun, APackingIsTakenAsItLies) {
+  const auto settled = fresh("settled", with(short_bed(), "time { end: 0.004 }", "time { end: 0.0005 }"));
+  ASSERT_EQ(run_in(settled), Reason::finished);
+  const auto source = list_checkpoints(settled / "checkpoints").front().path;
+  std::string other = with(with(short_bed(), "cells { x: 6 y: 14 z: 4 }", "cells { x: 5 y: 12 z: 3 }"), "spring {", "coulomb {");
+  other = with(other, "time { end: 0.004 }", "time { end: 0.0005 }");
+  const auto packed = [&](const std::string& name, const std::string& text) {
+    const auto path = fresh(name, text, "checkpoints { keep: 9 }");
+    if (comm.root()) std::filesystem::copy_file(source, path / "packing.h5");
+    comm.barrier();
+    return path;
+  };
+  const auto path = packed("packed", other);
+  EXPECT_EQ(run_in(path), Reason::finished);
+  const auto checkpoints = list_checkpoints(path / "checkpoints");
+  const CheckpointReader before(comm, source), after(comm, checkpoints.back().path);
+  EXPECT_EQ(after.time(), 0);
+  EXPECT_EQ(after.step(), 0u);
+  const auto by_id = [&](const CheckpointReader& reader) {  // all ranks' particles
+    std::map<double, std::vector<double>> particles;
+    const auto ids = reader.integer_rows("particles/id");
+    const auto places = reader.rows("particles/position"), velocities = reader.rows("particles/velocity");
+    std::vector<double> mine;
+    for (std::size_t i = 0; i < ids.size(); ++i)
+      mine.insert(mine.end(), {static_cast<double>(ids[i]), places[3 * i], places[3 * i + 1], places[3 * i + 2], velocities[3 * i],
+                               velocities[3 * i + 1], velocities[3 * i + 2]});
+    const auto all = comm.gather_all(mine);
+    for (std::size_t i = 0; i < all.size(); i += 7)
+      particles[all[i]] = {all.begin() + static_cast<std::ptrdiff_t>(i) + 1, all.begin() + static_cast<std::ptrdiff_t>(i) + 7};
+    return particles;
+  };
+  EXPECT_EQ(by_id(after).size(), 600u);
+  EXPECT_EQ(by_id(after), by_id(before));
+
+  // Others than its own particles cannot be there.
+  EXPECT_EQ(run_in(packed("larger", with(other, "diameter: 0.0012", "diameter: 0.0011"))), Reason::invalid_case);
+  EXPECT_NE(events(folder.path() / "larger").back().stopped().message().find("the largest diameter is 0.0012 there"),
+            std::string::npos);
 }
 
 TEST_F(JobRun, EveryReasonToStopHasItsName) {

@@ -1,0 +1,226 @@
+#include "study_report.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "failure.h"
+#include "gnuplot.h"
+#include "statistics_table.h"
+#include "terminal.h"
+
+namespace bedflow::client {
+
+namespace {
+
+constexpr int panel_width = 820, panel_height = 560, title_height = 56;
+
+bool has_error(const v1::StudyRun& run, int quantity) {
+  return quantity < run.errors_size() && run.errors(quantity).has_value();
+}
+
+const v1::Estimate& reference_of(const v1::Study& study, int quantity) {
+  static const v1::Estimate none;
+  const auto& run = study.runs(static_cast<int>(study.spec().reference()));
+  return quantity < run.quantities_size() ? run.quantities(quantity) : none;
+}
+
+// In per cent of the reference's magnitude.
+double relative(const v1::Study& study, int quantity, double value) {
+  return 100 * value / std::abs(reference_of(study, quantity).mean());
+}
+
+std::string short_text(double value, const char* format = "%.2g") {
+  char text[32];
+  std::snprintf(text, sizeof text, format, value);
+  return text;
+}
+
+std::string error_text(const v1::Study& study, int point, int quantity) {
+  const auto& run = study.runs(point);
+  if (point == static_cast<int>(study.spec().reference())) return "reference";
+  if (!has_error(run, quantity)) return "-";
+  const auto& error = run.errors(quantity);
+  std::string text = short_text(relative(study, quantity, error.value())) + " %";
+  if (error.has_half_width()) text += " ± " + short_text(relative(study, quantity, error.half_width()));
+  return text + (error.equal() ? ", equal" : "");
+}
+
+std::string run_state(const v1::StudyRun& run) {
+  if (!run.has_job()) return "waiting";
+  if (run.reused() && run.state() == v1::SUCCEEDED) return "reused";
+  if (run.interval_met()) return "interval met";
+  std::string text = run.has_state() ? state_name(run.state()) : "submitted";
+  if (run.state() == v1::RUNNING) text += " " + short_text(100 * run.done()) + " %";
+  if (run.state() == v1::FAILED) text += " " + reason_name(run.reason());
+  return text;
+}
+
+Table long_form(const v1::Study& study) {
+  std::vector<std::string> columns = {"run"};
+  for (const auto& axis : study.spec().axes()) columns.push_back(axis);
+  for (const char* name : {"job", "state", "quantity", "mean", "half_width", "bins", "error", "error_half_width", "equal",
+                           "on_front", "cpu_seconds_per_simulated_second"})
+    columns.emplace_back(name);
+  Table table(columns);
+  for (int i = 0; i < study.runs_size(); ++i) {
+    const auto& run = study.runs(i);
+    for (int q = 0; q < study.spec().quantities_size(); ++q) {
+      std::vector<Cell> row = {static_cast<std::uint64_t>(i)};
+      for (const auto& value : study.spec().points(i).values()) row.emplace_back(value);
+      const auto estimate = q < run.quantities_size() ? run.quantities(q) : v1::Estimate();
+      const auto error = q < run.errors_size() ? run.errors(q) : v1::StudyError();
+      const auto number = [](bool there, double value) { return there ? Cell(value) : Cell(); };
+      row.emplace_back(run.job());
+      row.emplace_back(run_state(run));
+      row.emplace_back(quantity_name(study.spec().quantities(q)));
+      row.push_back(number(estimate.has_mean(), estimate.mean()));
+      row.push_back(number(estimate.has_half_width(), estimate.half_width()));
+      row.emplace_back(std::uint64_t{estimate.bins()});
+      row.push_back(number(error.has_value(), error.value()));
+      row.push_back(number(error.has_half_width(), error.half_width()));
+      row.push_back(error.has_equal() ? Cell(error.equal()) : Cell());
+      row.push_back(q < run.on_front_size() ? Cell(run.on_front(q)) : Cell());
+      row.push_back(number(run.has_cost(), run.cost().cpu_seconds()));
+      table.add(std::move(row));
+    }
+  }
+  return table;
+}
+
+// One point of a line in the picture: cost, error and interval in per cent.
+std::string plot_row(const v1::Study& study, int point, int quantity) {
+  const auto& run = study.runs(point);
+  if (!run.has_cost() || !has_error(run, quantity)) return {};
+  const auto& error = run.errors(quantity);
+  const bool is_reference = point == static_cast<int>(study.spec().reference());
+  const double value = relative(study, quantity, error.value()), half = relative(study, quantity, error.half_width());
+  return number_text(run.cost().cpu_seconds()) + " " + number_text(value) + " " + number_text(is_reference ? 0 : half) + " " +
+         gnuplot_quoted(is_reference ? "reference" : point_name(study.spec(), point)) + "\n";
+}
+
+// The axis along which a point differs from the reference: none of the reference itself, all as one of a full grid.
+std::string line_of(const v1::StudySpec& spec, int point) {
+  const auto& reference = spec.points(static_cast<int>(spec.reference()));
+  std::string name;
+  for (int a = 0; a < spec.axes_size(); ++a)
+    if (spec.points(point).values(a) != reference.values(a)) name += (name.empty() ? "" : " and ") + spec.axes(a);
+  return name;
+}
+
+}  // namespace
+
+std::string quantity_name(const v1::StudyQuantity& quantity) {
+  return quantity.monitor() + (quantity.fluctuation() ? " fluctuation" : "");
+}
+
+std::string study_state_name(v1::StudyState state) {
+  return v1::StudyState_Name(state).substr(6);
+}
+
+std::string point_name(const v1::StudySpec& spec, int point) {
+  const auto& reference = spec.points(static_cast<int>(spec.reference()));
+  std::string name;
+  for (int a = 0; a < spec.axes_size(); ++a) {
+    const auto& value = spec.points(point).values(a);
+    if (value != reference.values(a)) name += (name.empty() ? "" : " ") + spec.axes(a) + "=" + value;
+  }
+  return name.empty() ? "reference" : name;
+}
+
+std::string study_table(const v1::Study& study) {
+  const auto& spec = study.spec();
+  std::vector<std::string> columns(spec.axes().begin(), spec.axes().end());
+  columns.insert(columns.end(), {"state", "CPU s/s", "speed-up"});
+  for (const auto& quantity : spec.quantities()) {
+    columns.push_back(quantity_name(quantity) + " ± 95 %");
+    columns.emplace_back("difference");
+    columns.emplace_back("front");
+  }
+  Table table(columns);
+  const auto& reference = study.runs(static_cast<int>(spec.reference()));
+  for (int i = 0; i < study.runs_size(); ++i) {
+    const auto& run = study.runs(i);
+    std::vector<Cell> row;
+    for (const auto& value : spec.points(i).values()) row.emplace_back(value);
+    row.emplace_back(run_state(run));
+    row.emplace_back(run.has_cost() ? short_text(run.cost().cpu_seconds(), "%.3g") : "-");
+    const bool comparable = run.has_cost() && reference.has_cost();
+    row.emplace_back(comparable ? short_text(reference.cost().cpu_seconds() / run.cost().cpu_seconds(), "%.3g") + " x" : "-");
+    for (int q = 0; q < spec.quantities_size(); ++q) {
+      row.emplace_back(q < run.quantities_size() ? estimate_text(run.quantities(q)) : "-");
+      row.emplace_back(error_text(study, i, q));
+      row.emplace_back(q < run.on_front_size() && run.on_front(q) ? "*" : "");
+    }
+    table.add(std::move(row));
+  }
+  return table.text(Format::table);
+}
+
+void print_study(const v1::Study& study, Format format) {
+  if (format == Format::table) {
+    print_data(study_table(study));
+    if (!study.message().empty()) say(study.message());
+    return;
+  }
+  print_message(study, long_form(study), format);
+}
+
+Table table_of(const std::vector<v1::Study>& studies) {
+  Table table({"study", "name", "state", "runs", "ended", "created"});
+  for (const auto& study : studies) {
+    const auto ended = std::ranges::count_if(
+        study.runs(), [](const auto& run) { return run.has_state() && (is_final(run.state()) || run.interval_met()); });
+    table.add({study.id(), study.spec().name(), study_state_name(study.state()), static_cast<std::uint64_t>(study.runs_size()),
+               static_cast<std::uint64_t>(ended), time_text(study.created_unix_nanos())});
+  }
+  return table;
+}
+
+std::string study_plot(const v1::Study& study, const std::filesystem::path& file) {
+  const auto& spec = study.spec();
+  const int panels = spec.quantities_size(), columns = panels > 1 ? 2 : 1, rows = (panels + columns - 1) / columns;
+  std::string text = picture_head(file, {columns * panel_width, rows * panel_height + title_height});
+  text += "set multiplot layout " + std::to_string(rows) + "," + std::to_string(columns) + " title " +
+          gnuplot_quoted(spec.name() + "    " + study.id()) + " font \",16\"\n";
+  text += "set key below center horizontal Left reverse samplen 2 spacing 1.1 nobox\nset logscale x\n";
+  std::set<std::string> lines;
+  for (int i = 0; i < spec.points_size(); ++i) lines.insert(line_of(spec, i));
+  lines.erase("");
+  for (int q = 0; q < panels; ++q) {
+    std::string front, draws;
+    for (int i = 0; i < spec.points_size(); ++i)
+      if (q < study.runs(i).on_front_size() && study.runs(i).on_front(q)) front += plot_row(study, i, q);
+    int index = 0;
+    for (const auto& line : lines) {
+      std::vector<std::pair<double, std::string>> points;
+      for (int i = 0; i < spec.points_size(); ++i) {
+        const bool belongs = line_of(spec, i) == line || i == static_cast<int>(spec.reference());
+        if (const auto row = plot_row(study, i, q); belongs && !row.empty())
+          points.emplace_back(study.runs(i).cost().cpu_seconds(), row);
+      }
+      std::ranges::sort(points);
+      if (points.size() < 2) continue;
+      const std::string block = "$q" + std::to_string(q) + "_" + std::to_string(index);
+      text += block + " << EOD\n";
+      for (const auto& [cost, row] : points) text += row;
+      text += "EOD\n";
+      const std::string colour = " lc " + std::to_string(index + 1);
+      draws += (draws.empty() ? "" : ", \\\n  ") + block + " using 1:2:3 with yerrorlines pt 7 ps 0.9 lw 1.3" + colour +
+               " title " + gnuplot_quoted(line) + ", \\\n  " + block + " using 1:2:4 with labels offset 0,0.9 font \",9\" tc rgb \"#555555\" notitle";
+      ++index;
+    }
+    text += "set title " + gnuplot_quoted(quantity_name(spec.quantities(q))) + " font \",15\"\n";
+    text += "set xlabel \"CPU seconds per simulated second\"\nset ylabel \"difference from the reference  /  %\"\n";
+    if (!front.empty()) {
+      text += "$front" + std::to_string(q) + " << EOD\n" + front + "EOD\n";
+      draws += (draws.empty() ? "" : ", \\\n  ") + ("$front" + std::to_string(q)) +
+               " using 1:2 with points pt 6 ps 2.2 lw 1.6 lc rgb \"#c0392b\" title \"front: none is cheaper and closer\"";
+    }
+    draws += std::string(draws.empty() ? "" : ", \\\n  ") + "0 with lines dt 2 lw 1 lc rgb \"#888888\" notitle";
+    text += "set offsets graph 0.12, graph 0.12, graph 0.1, graph 0.1\nplot " + draws + "\n";
+  }
+  return text + "unset multiplot\nunset output\n";
+}
+
+}  // namespace bedflow::client
