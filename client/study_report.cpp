@@ -88,7 +88,16 @@ Table long_form(const v1::Study& study) {
   return table;
 }
 
-// One point of a line in the picture: cost, error and interval in per cent.
+// The values of a point in which it differs from the reference.
+std::string mark_of(const v1::StudySpec& spec, int point) {
+  const auto& reference = spec.points(static_cast<int>(spec.reference()));
+  std::string text;
+  for (int a = 0; a < spec.axes_size(); ++a)
+    if (spec.points(point).values(a) != reference.values(a)) text += (text.empty() ? "" : ", ") + spec.points(point).values(a);
+  return text;
+}
+
+// One point of a line in the picture: cost, error and interval in per cent, and what to write beside it.
 std::string plot_row(const v1::Study& study, int point, int quantity) {
   const auto& run = study.runs(point);
   if (!run.has_cost() || !has_error(run, quantity)) return {};
@@ -96,7 +105,7 @@ std::string plot_row(const v1::Study& study, int point, int quantity) {
   const bool is_reference = point == static_cast<int>(study.spec().reference());
   const double value = relative(study, quantity, error.value()), half = relative(study, quantity, error.half_width());
   return number_text(run.cost().cpu_seconds()) + " " + number_text(value) + " " + number_text(is_reference ? 0 : half) + " " +
-         gnuplot_quoted(is_reference ? "reference" : point_name(study.spec(), point)) + "\n";
+         gnuplot_quoted(mark_of(study.spec(), point)) + "\n";
 }
 
 // The axis along which a point differs from the reference: none of the reference itself, all as one of a full grid.
@@ -183,7 +192,14 @@ std::string study_plot(const v1::Study& study, const std::filesystem::path& file
   std::string text = picture_head(file, {columns * panel_width, rows * panel_height + title_height});
   text += "set multiplot layout " + std::to_string(rows) + "," + std::to_string(columns) + " title " +
           gnuplot_quoted(spec.name() + "    " + study.id()) + " font \",16\"\n";
-  text += "set key below center horizontal Left reverse samplen 2 spacing 1.1 nobox\nset logscale x\n";
+  double cheapest = 1e300, dearest = 0;
+  for (const auto& run : study.runs()) {
+    if (!run.has_cost()) continue;
+    cheapest = std::min(cheapest, run.cost().cpu_seconds());
+    dearest = std::max(dearest, run.cost().cpu_seconds());
+  }
+  text += "set key below center maxrows 1 Left reverse samplen 2 nobox\nset logscale x\n";
+  if (dearest > 0) text += "set xrange [" + number_text(0.8 * cheapest) + ":" + number_text(1.4 * dearest) + "]\n";
   std::set<std::string> lines;
   for (int i = 0; i < spec.points_size(); ++i) lines.insert(line_of(spec, i));
   lines.erase("");
@@ -207,7 +223,8 @@ std::string study_plot(const v1::Study& study, const std::filesystem::path& file
       text += "EOD\n";
       const std::string colour = " lc " + std::to_string(index + 1);
       draws += (draws.empty() ? "" : ", \\\n  ") + block + " using 1:2:3 with yerrorlines pt 7 ps 0.9 lw 1.3" + colour +
-               " title " + gnuplot_quoted(line) + ", \\\n  " + block + " using 1:2:4 with labels offset 0,0.9 font \",9\" tc rgb \"#555555\" notitle";
+               " title " + gnuplot_quoted(line) + ", \\\n  " + block +
+               " using 1:2:4 with labels left rotate by 45 offset 0.4,0.5 font \",10\" tc lt " + std::to_string(index + 1) + " notitle";
       ++index;
     }
     text += "set title " + gnuplot_quoted(quantity_name(spec.quantities(q))) + " font \",15\"\n";
@@ -215,10 +232,10 @@ std::string study_plot(const v1::Study& study, const std::filesystem::path& file
     if (!front.empty()) {
       text += "$front" + std::to_string(q) + " << EOD\n" + front + "EOD\n";
       draws += (draws.empty() ? "" : ", \\\n  ") + ("$front" + std::to_string(q)) +
-               " using 1:2 with points pt 6 ps 2.2 lw 1.6 lc rgb \"#c0392b\" title \"front: none is cheaper and closer\"";
+               " using 1:2 with points pt 6 ps 2.2 lw 1.6 lc rgb \"#c0392b\" title \"on the front\"";
     }
     draws += std::string(draws.empty() ? "" : ", \\\n  ") + "0 with lines dt 2 lw 1 lc rgb \"#888888\" notitle";
-    text += "set offsets graph 0.12, graph 0.12, graph 0.1, graph 0.1\nplot " + draws + "\n";
+    text += "plot " + draws + "\n";
   }
   return text + "unset multiplot\nunset output\n";
 }
