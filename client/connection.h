@@ -1,4 +1,5 @@
-// The gRPC calls, one at a time, each with a deadline; a refused call becomes a Failure with its exit code.
+// The gRPC calls, one at a time, each with a deadline; a refused call becomes a Failure with its exit code. What leaves the
+// machine goes over TLS, with the token of the context.
 #pragma once
 
 #include <grpcpp/grpcpp.h>
@@ -8,6 +9,7 @@
 #include <string>
 
 #include "bedflow/v1/service.grpc.pb.h"
+#include "contexts.h"
 #include "failure.h"
 
 namespace bedflow::client {
@@ -19,8 +21,11 @@ std::string default_address();
 
 class Connection {
  public:
-  // A gRPC target: "unix:/path/to/socket" or "127.0.0.1:port". Nothing is sent yet.
-  explicit Connection(std::string address);
+  // Nothing is sent yet; but the files that a context names are read, and Failure thrown where they cannot serve.
+  explicit Connection(const ServerChoice& choice) : Connection(choice.resolve()) {}
+  explicit Connection(const v1::Context& context);
+  // A gRPC target of this machine: "unix:/path/to/socket" or "127.0.0.1:port".
+  explicit Connection(const std::string& address);
 
   template <class Request, class Response>
   using Method = grpc::Status (Stub::*)(grpc::ClientContext*, const Request&, Response*);
@@ -45,6 +50,7 @@ class Connection {
   using Attempt = std::function<grpc::Status(grpc::ClientContext*)>;
   grpc::Status run(const Attempt& attempt, double seconds) const;
 
+  v1::Context context_;
   std::string address_;
   std::unique_ptr<Stub> stub_;
 };

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "bedflow/v1/service.pb.h"
+#include "contexts.h"
 #include "table.h"
 
 namespace bedflow::client {
@@ -17,7 +18,7 @@ struct Field {
 
 struct FieldSource {
   std::string job;  // id, or job folder
-  std::string server;
+  ServerChoice server;
   std::optional<std::uint64_t> step;  // newest good checkpoint if absent
   bool fresh = false;                 // of a running job: write one first
 };

@@ -42,6 +42,7 @@ Table table_of(const v1::Job& job) {
   table.add({"id", job.id()});
   table.add({"case", job.case_name()});
   table.add({"state", state_text(job)});
+  if (job.has_owner()) table.add({"owner", job.owner()});
   if (!job.message().empty()) table.add({"message", job.message()});
   table.add({"progress", progress_text(job)});
   if (job.has_progress()) {

@@ -69,6 +69,7 @@ Exit submit(const Program& program, const SubmitOptions& options) {
 
 struct ListOptions {
   std::vector<std::string> states, labels;
+  std::string owner;
   std::uint32_t most = 50;
   Format format = Format::table;
 };
@@ -88,6 +89,7 @@ Exit list(const Program& program, const ListOptions& options) {
     if (equals == label.npos) throw Failure(Exit::usage, "--label " + label + ": not of the form NAME=VALUE");
     (*request.mutable_labels())[label.substr(0, equals)] = label.substr(equals + 1);
   }
+  if (!options.owner.empty()) request.set_owner(options.owner);
   const Connection connection(program.server);
   std::vector<v1::Job> jobs;
   std::string page;
@@ -201,6 +203,8 @@ void add_job_verbs(CLI::App& app, Program& program) {
   verb = app.add_subcommand("list", "list the jobs, newest first");
   verb->add_option("--state", list_options->states, "only in this state")->type_name("STATE");
   verb->add_option("--label", list_options->labels, "only with this label")->type_name("NAME=VALUE");
+  verb->add_option("--owner", list_options->owner, "only this owner's; `bedflow server info` tells who you are")
+      ->type_name("OWNER");
   verb->add_option("--most", list_options->most, "at most so many")->check(CLI::PositiveNumber)->capture_default_str();
   add_format(verb, list_options->format);
   on_call(verb, program, list_options, list);

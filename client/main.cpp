@@ -3,7 +3,6 @@
 
 #include <cstdlib>
 
-#include "connection.h"
 #include "verbs.h"
 
 namespace bedflow::client {
@@ -33,10 +32,12 @@ int run(int argc, char** argv) {
   app.require_subcommand(1);
   app.fallthrough();
   app.get_formatter()->column_width(34);
-  app.add_option("--server", program.server, "address of the server, unix:PATH or HOST:PORT")
-      ->envname("BEDFLOW_SERVER")
+  app.add_option("--server", program.server.address, "address of the server, unix:PATH or HOST:PORT; or BEDFLOW_SERVER")
       ->type_name("ADDRESS")
       ->default_str("the socket of bedflowd");
+  app.add_option("--context", program.server.context, "a server by name, see `bedflow context`; or BEDFLOW_CONTEXT")
+      ->type_name("NAME")
+      ->default_str("the one in use");
   add_run_verb(app, program);
   add_case_verbs(app, program);
   add_job_verbs(app, program);
@@ -46,6 +47,7 @@ int run(int argc, char** argv) {
   add_checkpoint_verbs(app, program);
   add_study_verbs(app, program);
   add_server_verbs(app, program);
+  add_context_verbs(app, program);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -57,7 +59,6 @@ int run(int argc, char** argv) {
     app.exit(error);
     return static_cast<int>(asked_for_help ? Exit::ok : Exit::usage);
   }
-  if (program.server.empty()) program.server = default_address();
   return static_cast<int>(program.verb());
 }
 
@@ -65,6 +66,7 @@ int run(int argc, char** argv) {
 }  // namespace bedflow::client
 
 int main(int argc, char** argv) {
+  setenv("GRPC_VERBOSITY", "NONE", 0);  // what goes wrong is told by us, once
   try {
     return bedflow::client::run(argc, argv);
   } catch (const bedflow::client::Failure& failure) {

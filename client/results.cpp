@@ -27,7 +27,7 @@ bool is_job_folder(const std::filesystem::path& path) {
   return std::filesystem::exists(path / "case.txtpb");
 }
 
-Results::Results(const std::string& job, const std::string& server) : server_(server) {
+Results::Results(const std::string& job, const ServerChoice& server) : server_(server) {
   if (is_job_folder(job)) {
     folder_ = std::filesystem::canonical(job);
   } else if (job.find('/') != job.npos || std::filesystem::is_directory(job)) {

@@ -15,7 +15,7 @@ namespace bedflow::client {
 class Results {
  public:
   // `job` is a job folder (a folder with a case.txtpb in it) or the id of a job on the server. Throws Failure.
-  Results(const std::string& job, const std::string& server);
+  Results(const std::string& job, const ServerChoice& server);
 
   v1::Statistics statistics(const StatisticsQuery& query) const;
   std::vector<v1::SeriesInfo> series() const;  // and profiles
@@ -29,7 +29,7 @@ class Results {
 
   std::filesystem::path folder_;  // empty: ask the server
   std::string id_;
-  std::string server_;
+  ServerChoice server_;
 };
 
 // Of a job folder, newest first; of a step if one is named.

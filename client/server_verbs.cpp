@@ -1,4 +1,4 @@
-// server info.
+// server info; server token: token_verbs.cpp.
 #include "connection.h"
 #include "terminal.h"
 #include "verbs.h"
@@ -12,7 +12,8 @@ struct InfoOptions {
 };
 
 Exit server_info(const Program& program, const InfoOptions& options) {
-  const auto info = Connection(program.server).call(&Stub::GetServerInfo, v1::GetServerInfoRequest());
+  const Connection connection(program.server);
+  const auto info = connection.call(&Stub::GetServerInfo, v1::GetServerInfoRequest());
   Table table({"property", "value"});
   const auto joined = [](const auto& names) {
     std::string text;
@@ -20,7 +21,8 @@ Exit server_info(const Program& program, const InfoOptions& options) {
     return text;
   };
   table.add({"version", info.version()});
-  table.add({"address", info.address().empty() ? program.server : info.address()});
+  table.add({"address", info.address().empty() ? connection.address() : info.address()});
+  if (info.has_caller()) table.add({"you are", info.caller() + ", " + v1::Scope_Name(info.caller_scope())});
   table.add({"executors", joined(info.executors())});
   table.add({"ranks in use", std::to_string(info.ranks_in_use()) + " of " + std::to_string(info.slots())});
   table.add({"jobs running", std::to_string(info.jobs_running())});
@@ -40,6 +42,7 @@ void add_server_verbs(CLI::App& app, Program& program) {
   auto* verb = server->add_subcommand("info", "version, models, slots, queue, disk");
   add_format(verb, info_options->format);
   on_call(verb, program, info_options, server_info);
+  add_token_verbs(server, program);
 }
 
 }  // namespace bedflow::client

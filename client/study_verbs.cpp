@@ -235,9 +235,9 @@ Exit begin(const Program& program, const StudyOptions& options) {
   request.set_request_id(new_request_id());
   std::unique_ptr<EmbeddedServer> own;
   if (!options.data.empty()) own = std::make_unique<EmbeddedServer>(options.data);
-  const Connection connection(own ? own->address() : program.server);
+  const Connection connection(own ? ServerChoice{own->address(), ""} : program.server);
   const auto id = connection.call(&Stub::CreateStudy, request, 120).id();
-  const std::string come_back = "bedflow study get " + id + (own ? " --server " + own->address() : "");
+  const std::string come_back = "bedflow study get " + id + (own ? " --server " + own->address() : program.server.words());
   say("study " + id + " of " + std::to_string(request.spec().points_size()) + " runs; come back: " + come_back);
   const auto study = follow(connection, id, interrupt, own.get());
   if (!study) {

@@ -6,13 +6,14 @@
 #include <memory>
 #include <string>
 
+#include "contexts.h"
 #include "failure.h"
 #include "table.h"
 
 namespace bedflow::client {
 
 struct Program {
-  std::string server;          // --server, BEDFLOW_SERVER, or the default
+  ServerChoice server;         // what --server and --context say
   std::function<Exit()> verb;  // what was asked for
 };
 
@@ -25,6 +26,8 @@ void add_field_verbs(CLI::App& app, Program& program);       // field
 void add_checkpoint_verbs(CLI::App& app, Program& program);  // checkpoint
 void add_study_verbs(CLI::App& app, Program& program);       // study
 void add_server_verbs(CLI::App& app, Program& program);      // server
+void add_token_verbs(CLI::App* server, Program& program);    // server token
+void add_context_verbs(CLI::App& app, Program& program);     // context
 
 // The verb's function is called once the whole line has been parsed.
 template <class Options>

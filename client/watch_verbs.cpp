@@ -16,10 +16,6 @@ struct WatchOptions {
   Format format = Format::table;
 };
 
-std::string server_words(const Program& program) {
-  return program.server == default_address() ? "" : " --server " + program.server;
-}
-
 Exit watch(const Program& program, const WatchOptions& options) {
   Interrupt interrupt;
   const Connection connection(program.server);
@@ -28,10 +24,10 @@ Exit watch(const Program& program, const WatchOptions& options) {
   live.plan.from_now = !options.history && options.after == 0;
   live.plan.away_seconds = options.away;
   live.format = options.format;
-  live.detached = {"come back: bedflow watch " + options.job + server_words(program),
-                   "cancel:    bedflow cancel " + options.job + server_words(program)};
+  live.detached = {"come back: bedflow watch " + options.job + program.server.words(),
+                   "cancel:    bedflow cancel " + options.job + program.server.words()};
   const auto end = view_job(connection, options.job, live, interrupt);
-  if (end.exit == Exit::job_failed) say("what it said: bedflow logs " + options.job + server_words(program));
+  if (end.exit == Exit::job_failed) say("what it said: bedflow logs " + options.job + program.server.words());
   return end.exit;
 }
 

@@ -16,7 +16,8 @@ constexpr const char* jobs_table = R"(
     state INTEGER NOT NULL,
     retries INTEGER NOT NULL,
     from_step INTEGER,
-    job BLOB NOT NULL);
+    job BLOB NOT NULL,
+    owner TEXT NOT NULL DEFAULT 'local');
   CREATE INDEX jobs_by_state ON jobs (state, number);
 )";
 constexpr const char* submissions_table = R"(
@@ -24,11 +25,15 @@ constexpr const char* submissions_table = R"(
     number INTEGER PRIMARY KEY REFERENCES jobs (number),
     request_id TEXT UNIQUE,
     content BLOB NOT NULL);
-  PRAGMA user_version = 2;
 )";
 constexpr const char* from_version_1 = R"(
   INSERT INTO submissions SELECT jobs.number, requests.id, requests.content FROM requests JOIN jobs ON jobs.id = requests.job;
   DROP TABLE requests;
+)";
+constexpr const char* without_owners = "ALTER TABLE jobs ADD COLUMN owner TEXT NOT NULL DEFAULT 'local'";
+constexpr const char* to_version_3 = R"(
+  CREATE INDEX jobs_by_owner ON jobs (owner, state, number);
+  PRAGMA user_version = 3;
 )";
 
 // A commit that overwrites its part of the write-ahead log waits for the data alone; one that makes the log longer waits for the
@@ -125,6 +130,7 @@ JobRecord record_of(const Statement& row) {
   if (!record.job.ParseFromString(row.bytes(3))) {
     throw std::runtime_error("catalogue: job number " + std::to_string(record.number) + " is damaged");
   }
+  if (!record.job.has_owner()) record.job.set_owner(local_owner);  // of a time when there were no others
   return record;
 }
 
@@ -161,12 +167,13 @@ Catalogue::Catalogue(const std::filesystem::path& file) {
   version.step();
   const auto found = version.number(0);
   version.reset();
-  if (found > 2) throw std::runtime_error("catalogue: " + file.string() + " was written by a newer bedflowd");
-  if (found < 2) {
+  if (found > 3) throw std::runtime_error("catalogue: " + file.string() + " was written by a newer bedflowd");
+  if (found < 3) {
     Transaction transaction(database);
-    if (found == 0) run(database, jobs_table);
-    run(database, submissions_table);
+    run(database, found == 0 ? jobs_table : without_owners);
+    if (found < 2) run(database, submissions_table);
     if (found == 1) run(database, from_version_1);
+    run(database, to_version_3);
     transaction.commit();
   }
   int keep = 1;  // the log stays as long as it is when the server ends
@@ -188,9 +195,9 @@ std::optional<Catalogue::Request> Catalogue::find_request(const std::string& req
 
 void Catalogue::insert(JobRecord& record, const std::string& request_id, const std::string& content) {
   Transaction transaction(database_.get());
-  Statement job(database_.get(), "INSERT INTO jobs (id, state, retries, from_step, job) VALUES (?, ?, ?, ?, ?)");
+  Statement job(database_.get(), "INSERT INTO jobs (id, state, retries, from_step, job, owner) VALUES (?, ?, ?, ?, ?, ?)");
   job.bind(record.job.id()).bind(record.job.state()).bind(record.retries).bind(record.from_step);
-  job.bind_blob(record.job.SerializeAsString()).step();
+  job.bind_blob(record.job.SerializeAsString()).bind(record.job.has_owner() ? record.job.owner() : local_owner).step();
   record.number = sqlite3_last_insert_rowid(database_.get());
   Statement submission(database_.get(), "INSERT INTO submissions (number, request_id, content) VALUES (?, nullif(?, ''), ?)");
   submission.bind(record.number).bind(request_id).bind_blob(content).step();
@@ -227,15 +234,21 @@ std::vector<JobRecord> Catalogue::in_states(const std::vector<v1::JobState>& sta
   return records_of(rows);
 }
 
-std::vector<JobRecord> Catalogue::page(std::int64_t below, const std::vector<v1::JobState>& states, std::int64_t most) const {
-  const std::string wanted = states.empty() ? "" : " AND " + in_list(states);
-  Statement rows(database_.get(), select("WHERE number < ?" + wanted + " ORDER BY number DESC LIMIT ?"));
-  rows.bind(below).bind(most);
+std::vector<JobRecord> Catalogue::page(std::int64_t below, const std::vector<v1::JobState>& states, std::int64_t most,
+                                       const std::string& owner) const {
+  std::string wanted = "WHERE number < ?";
+  if (!states.empty()) wanted += " AND " + in_list(states);
+  if (!owner.empty()) wanted += " AND owner = ?";
+  Statement rows(database_.get(), select(wanted + " ORDER BY number DESC LIMIT ?"));
+  rows.bind(below);
+  if (!owner.empty()) rows.bind(owner);
+  rows.bind(most);
   return records_of(rows);
 }
 
-std::int64_t Catalogue::count(const std::vector<v1::JobState>& states) const {
-  Statement row(database_.get(), "SELECT count(*) FROM jobs WHERE " + in_list(states));
+std::int64_t Catalogue::count(const std::vector<v1::JobState>& states, const std::string& owner) const {
+  Statement row(database_.get(), "SELECT count(*) FROM jobs WHERE " + in_list(states) + (owner.empty() ? "" : " AND owner = ?"));
+  if (!owner.empty()) row.bind(owner);
   row.step();
   return row.number(0);
 }

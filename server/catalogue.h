@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "bedflow/v1/service.pb.h"
+#include "caller.h"
 
 struct sqlite3;
 
@@ -34,7 +35,7 @@ class Catalogue {
     std::string content;  // what was asked: a CreateJobRequest, serialized deterministically
   };
   std::optional<Request> find_request(const std::string& request_id) const;
-  // Job and what was asked in one transaction; request_id may be empty. Gives the record its number.
+  // Job, with its owner, and what was asked in one transaction; request_id may be empty. Gives the record its number.
   void insert(JobRecord& record, const std::string& request_id, const std::string& content);
   std::string content(const JobRecord& record) const;  // empty: created before content was kept for every job
   void update(const JobRecord& record);
@@ -42,9 +43,10 @@ class Catalogue {
 
   std::optional<JobRecord> find(const std::string& id) const;
   std::vector<JobRecord> in_states(const std::vector<v1::JobState>& states, std::int64_t most = -1) const;  // oldest first
-  // Newest first, numbers below `below`, any state if none is named.
-  std::vector<JobRecord> page(std::int64_t below, const std::vector<v1::JobState>& states, std::int64_t most) const;
-  std::int64_t count(const std::vector<v1::JobState>& states) const;
+  // Newest first, numbers below `below`, any state if none is named, anybody's if no owner is.
+  std::vector<JobRecord> page(std::int64_t below, const std::vector<v1::JobState>& states, std::int64_t most,
+                              const std::string& owner = {}) const;
+  std::int64_t count(const std::vector<v1::JobState>& states, const std::string& owner = {}) const;
 
  private:
   struct Close {

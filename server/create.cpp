@@ -41,6 +41,11 @@ void write_folder(const JobFolder& folder, const std::string& text, const v1::Jo
   std::ofstream(folder.events()).close();  // empty: its growth can be watched from the start
 }
 
+// One owner's request ids are nothing to another. Those of "local" stand as they always did.
+std::string request_key(const std::string& owner, const std::string& request_id) {
+  return owner == local_owner || request_id.empty() ? request_id : owner + "/" + request_id;
+}
+
 void move_into_place(const JobFolder& draft, const JobFolder& folder) {
   fs::rename(draft.root(), folder.root());
   sync_folder(folder.root().parent_path());
@@ -48,9 +53,10 @@ void move_into_place(const JobFolder& draft, const JobFolder& folder) {
 
 }  // namespace
 
-std::optional<v1::CreateJobResponse> Jobs::earlier_answer(const v1::CreateJobRequest& request, const std::string& content) const {
+std::optional<v1::CreateJobResponse> Jobs::earlier_answer(const std::string& owner, const v1::CreateJobRequest& request,
+                                                          const std::string& content) const {
   if (request.request_id().empty()) return std::nullopt;
-  const auto earlier = catalogue_.find_request(request.request_id());
+  const auto earlier = catalogue_.find_request(request_key(owner, request.request_id()));
   if (!earlier) return std::nullopt;
   if (earlier->content != content) {
     throw Refusal(
@@ -97,19 +103,20 @@ v1::Case Jobs::read_case(const std::string& id) {
   return case_of(record_of(id));
 }
 
-v1::CreateJobResponse Jobs::create(const v1::CreateJobRequest& asked) {
+v1::CreateJobResponse Jobs::create(const Caller& caller, const v1::CreateJobRequest& asked) {
   v1::CreateJobRequest request = asked;
   request.clear_request_id();
   const std::string content = content_of(request);
   request.set_request_id(asked.request_id());
   JobRecord record;
+  record.job.set_owner(caller.owner);
   if (asked.has_request_id() && !is_request_id(request.request_id())) {
     throw Refusal(Refused::bad_request,
                   "request_id '" + printable(request.request_id()) + "' is not of the form [A-Za-z0-9-]{8,64}");
   }
   {
     const std::lock_guard guard(mutex_);
-    if (auto earlier = earlier_answer(request, content)) return *earlier;
+    if (auto earlier = earlier_answer(caller.owner, request, content)) return *earlier;
     if (request.has_start_from()) start_from(request, record);
   }
   if (request.packing_only() && !request.has_start_from()) {
@@ -150,11 +157,11 @@ v1::CreateJobResponse Jobs::commit(JobRecord& record, const v1::CreateJobRequest
     sync_folder(to.parent_path());
   }
   const std::lock_guard guard(mutex_);
-  if (auto earlier = earlier_answer(request, content)) return *earlier;  // a retry has overtaken us
+  if (auto earlier = earlier_answer(record.job.owner(), request, content)) return *earlier;  // a retry has overtaken us
   if (const JobFolder* folder = draft ? &draft->folder : imported) move_into_place(*folder, folder_of(record.job.id()));
-  catalogue_.insert(record, request.request_id(), content);
-  spdlog::info("{} is {}: case {}, {} ranks", record.job.id(), state_word(record.job.state()), printable(record.job.case_name()),
-               request.spec().ranks());
+  catalogue_.insert(record, request_key(record.job.owner(), request.request_id()), content);
+  spdlog::info("{} is {}: case {}, {} ranks, of {}", record.job.id(), state_word(record.job.state()),
+               printable(record.job.case_name()), request.spec().ranks(), record.job.owner());
   notifier_.poke();
   v1::CreateJobResponse response;
   *response.mutable_job() = view(record);

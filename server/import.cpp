@@ -41,15 +41,19 @@ class Place {
 // One import: a draft of a job's folder, and the file that comes in beside it.
 class Import {
  public:
-  Import(Jobs& jobs, Readers& readers, const v1::ImportCheckpointRequest::Head& head)
-      : jobs_(jobs), readers_(readers), head_(head), draft_(jobs.new_draft()), upload_(file(), head) {}
+  Import(Jobs& jobs, Readers& readers, const Caller& caller, const v1::ImportCheckpointRequest::Head& head)
+      : jobs_(jobs), readers_(readers), caller_(caller), head_(head), draft_(jobs.new_draft()), upload_(file(), head) {}
 
-  void take(const v1::ImportCheckpointRequest& part) { upload_.take(part); }
+  void take(const v1::ImportCheckpointRequest& part) {
+    caller_.require_still_good();
+    upload_.take(part);
+  }
   v1::Job finish() {
+    caller_.require_still_good();
     const std::uint32_t crc = upload_.finish();
     const auto report = readers_.import(file(), draft_.folder.root());
     std::filesystem::remove(file());
-    return jobs_.import(head_, draft_.folder, report, crc);
+    return jobs_.import(caller_, head_, draft_.folder, report, crc);
   }
 
  private:
@@ -57,6 +61,7 @@ class Import {
 
   Jobs& jobs_;
   Readers& readers_;
+  const Caller caller_;
   const Place place_;
   const v1::ImportCheckpointRequest::Head head_;
   const DraftFolder draft_;
@@ -66,10 +71,11 @@ class Import {
 class Importer final : public grpc::ServerReadReactor<v1::ImportCheckpointRequest>,
                        public std::enable_shared_from_this<Importer> {
  public:
-  Importer(Jobs& jobs, Readers& readers, boost::asio::thread_pool& pool, grpc::CallbackServerContext* context, v1::Job* response,
-           std::function<void()> done)
+  Importer(Jobs& jobs, Readers& readers, const Door& door, boost::asio::thread_pool& pool, grpc::CallbackServerContext* context,
+           v1::Job* response, std::function<void()> done)
       : jobs_(jobs),
         readers_(readers),
+        door_(door),
         pool_(pool),
         context_(context),
         response_(response),
@@ -120,7 +126,7 @@ class Importer final : public grpc::ServerReadReactor<v1::ImportCheckpointReques
       }
       if (!import_) {
         if (!part_.has_head()) throw Refusal(Refused::bad_upload, "the first message has no head");
-        import_.emplace(jobs_, readers_, part_.head());
+        import_.emplace(jobs_, readers_, door_.caller(*context_), part_.head());
       } else if (part_.has_head()) {
         throw Refusal(Refused::bad_upload, "a second head came");
       }
@@ -138,6 +144,7 @@ class Importer final : public grpc::ServerReadReactor<v1::ImportCheckpointReques
 
   Jobs& jobs_;
   Readers& readers_;
+  const Door& door_;
   boost::asio::thread_pool& pool_;
   grpc::CallbackServerContext* const context_;
   v1::Job* const response_;
@@ -151,10 +158,11 @@ class Importer final : public grpc::ServerReadReactor<v1::ImportCheckpointReques
 
 }  // namespace
 
-grpc::ServerReadReactor<v1::ImportCheckpointRequest>* open_import(Jobs& jobs, Readers& readers, boost::asio::thread_pool& pool,
+grpc::ServerReadReactor<v1::ImportCheckpointRequest>* open_import(Jobs& jobs, Readers& readers, const Door& door,
+                                                                  boost::asio::thread_pool& pool,
                                                                   grpc::CallbackServerContext* context, v1::Job* response,
                                                                   std::function<void()> done) {
-  auto importer = std::make_shared<Importer>(jobs, readers, pool, context, response, std::move(done));
+  auto importer = std::make_shared<Importer>(jobs, readers, door, pool, context, response, std::move(done));
   importer->start(importer);
   return importer.get();
 }
@@ -165,8 +173,8 @@ DraftFolder Jobs::new_draft() const {
   return DraftFolder(settings_.data / "drafts" / new_job_id());
 }
 
-v1::Job Jobs::import(const v1::ImportCheckpointRequest::Head& head, const JobFolder& draft, const v1::CheckpointReport& report,
-                     std::uint32_t crc) {
+v1::Job Jobs::import(const Caller& caller, const v1::ImportCheckpointRequest::Head& head, const JobFolder& draft,
+                     const v1::CheckpointReport& report, std::uint32_t crc) {
   v1::CreateJobRequest request;
   *request.mutable_spec() = head.spec();
   if (head.has_request_id()) request.set_request_id(head.request_id());
@@ -175,6 +183,7 @@ v1::Job Jobs::import(const v1::ImportCheckpointRequest::Head& head, const JobFol
   if (!head.spec().has_ranks()) request.mutable_spec()->set_ranks(std::min(report.ranks(), settings_.slots));
   require_sound(request, settings_.slots);
   JobRecord record;
+  record.job.set_owner(caller.owner);
   record.job.set_id(draft.root().filename());
   record.job.set_state(v1::STATE_SUSPENDED);
   record.job.set_message("imported at step " + std::to_string(report.step()) + "; resume it, or start others from it");

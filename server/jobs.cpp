@@ -53,6 +53,14 @@ JobRecord Jobs::record_of(const std::string& id) const {
   throw Refusal(Refused::job_not_found, "there is no job " + id, "bedflow list");
 }
 
+JobRecord Jobs::own_record(const Caller& caller, const std::string& id) const {
+  JobRecord record = record_of(id);
+  if (caller.may_act_on(record.job.owner())) return record;
+  throw Refusal(Refused::not_owner,
+                "job " + id + " is " + record.job.owner() + "'s; " + caller.owner + " may look at it, but not act on it",
+                "bedflow list --owner " + caller.owner);
+}
+
 v1::Job Jobs::view(const JobRecord& record) const {
   v1::Job job = record.job;
   job.set_folder(folder_of(job.id()).root());
@@ -126,7 +134,7 @@ v1::ListJobsResponse Jobs::list(const v1::ListJobsRequest& request) {
   const std::lock_guard guard(mutex_);
   v1::ListJobsResponse response;
   while (true) {
-    const auto page = catalogue_.page(below, states, static_cast<std::int64_t>(size) + 1);
+    const auto page = catalogue_.page(below, states, static_cast<std::int64_t>(size) + 1, request.owner());
     for (const auto& record : page) {
       if (static_cast<std::size_t>(response.jobs_size()) == size) {
         response.set_next_page_token(std::to_string(below));
@@ -147,10 +155,10 @@ JobRecord& Jobs::require(JobRecord& record, Request request, const char* wanted)
                 may_start_again ? "bedflow submit --from " + id : "bedflow get " + id);
 }
 
-v1::Job Jobs::request(const std::string& id, Request request, const char* wanted, v1::Control::Command command,
-                      bool skip_checkpoint) {
+v1::Job Jobs::request(const Caller& caller, const std::string& id, Request request, const char* wanted,
+                      v1::Control::Command command, bool skip_checkpoint) {
   const std::lock_guard guard(mutex_);
-  JobRecord found = record_of(id);
+  JobRecord found = own_record(caller, id);
   require(found, request, wanted);
   const auto live = live_.find(id);
   JobRecord& record = live == live_.end() ? found : live->second.record;
@@ -165,17 +173,17 @@ v1::Job Jobs::request(const std::string& id, Request request, const char* wanted
   return view(record);
 }
 
-v1::Job Jobs::cancel(const std::string& id, bool skip_checkpoint) {
-  return request(id, Request::cancel, "cancelled", v1::Control::CANCEL, skip_checkpoint);
+v1::Job Jobs::cancel(const Caller& caller, const std::string& id, bool skip_checkpoint) {
+  return request(caller, id, Request::cancel, "cancelled", v1::Control::CANCEL, skip_checkpoint);
 }
 
-v1::Job Jobs::suspend(const std::string& id) {
-  return request(id, Request::suspend, "suspended", v1::Control::SUSPEND, false);
+v1::Job Jobs::suspend(const Caller& caller, const std::string& id) {
+  return request(caller, id, Request::suspend, "suspended", v1::Control::SUSPEND, false);
 }
 
-v1::Job Jobs::resume(const v1::ResumeJobRequest& request) {
+v1::Job Jobs::resume(const Caller& caller, const v1::ResumeJobRequest& request) {
   const std::lock_guard guard(mutex_);
-  JobRecord record = record_of(request.id());
+  JobRecord record = own_record(caller, request.id());
   require(record, Request::resume, "resumed");
   const auto folder = folder_of(request.id());
   if (request.ranks() > settings_.slots) {
@@ -196,9 +204,9 @@ v1::Job Jobs::resume(const v1::ResumeJobRequest& request) {
   return view(record);
 }
 
-v1::Checkpoint Jobs::create_checkpoint(const std::string& id, std::chrono::duration<double> limit) {
+v1::Checkpoint Jobs::create_checkpoint(const Caller& caller, const std::string& id, std::chrono::duration<double> limit) {
   std::unique_lock guard(mutex_);
-  JobRecord record = record_of(id);
+  JobRecord record = own_record(caller, id);
   require(record, Request::checkpoint, "asked for a checkpoint");
   const auto before = live_.at(id).attempt.last_sequence();
   live_.at(id).attempt.folder().command(v1::Control::CHECKPOINT);

@@ -15,6 +15,7 @@
 #include <string>
 
 #include "attempt.h"
+#include "caller.h"
 #include "catalogue.h"
 #include "executor.h"
 #include "folder.h"
@@ -31,8 +32,6 @@ struct Settings {
   std::chrono::seconds heartbeat_limit{30};
 };
 
-std::int64_t now_nanos();  // since the epoch of Unix
-
 // Equal messages give equal bytes: maps in order.
 std::string content_of(const google::protobuf::Message& message);
 
@@ -43,19 +42,19 @@ class Jobs {
  public:
   explicit Jobs(Settings settings);  // takes up what earlier servers have left
 
-  // Calls. They throw Refusal.
-  v1::CreateJobResponse create(const v1::CreateJobRequest& request);
+  // Calls. They throw Refusal; those that make a job or change one, for a caller who may not, too.
+  v1::CreateJobResponse create(const Caller& caller, const v1::CreateJobRequest& request);
   v1::Job get(const std::string& id);
   v1::ListJobsResponse list(const v1::ListJobsRequest& request);
-  v1::Job cancel(const std::string& id, bool skip_checkpoint);
-  v1::Job suspend(const std::string& id);
-  v1::Job resume(const v1::ResumeJobRequest& request);
-  std::uint64_t remove(const std::string& id);  // the bytes that are free again
+  v1::Job cancel(const Caller& caller, const std::string& id, bool skip_checkpoint);
+  v1::Job suspend(const Caller& caller, const std::string& id);
+  v1::Job resume(const Caller& caller, const v1::ResumeJobRequest& request);
+  std::uint64_t remove(const Caller& caller, const std::string& id);  // the bytes that are free again
   DraftFolder new_draft() const;
   // A suspended job of a draft with a case and a checkpoint. crc: of the file that was sent.
-  v1::Job import(const v1::ImportCheckpointRequest::Head& head, const JobFolder& draft, const v1::CheckpointReport& report,
-                 std::uint32_t crc);
-  v1::Checkpoint create_checkpoint(const std::string& id, std::chrono::duration<double> limit);
+  v1::Job import(const Caller& caller, const v1::ImportCheckpointRequest::Head& head, const JobFolder& draft,
+                 const v1::CheckpointReport& report, std::uint32_t crc);
+  v1::Checkpoint create_checkpoint(const Caller& caller, const std::string& id, std::chrono::duration<double> limit);
   v1::ServerInfo info();
   JobFolder folder(const std::string& id);    // of a job that exists; it may not have been laid out yet
   v1::Case read_case(const std::string& id);  // the effective case
@@ -82,15 +81,18 @@ class Jobs {
 
   JobFolder folder_of(const std::string& id) const { return JobFolder(settings_.data / "jobs" / id); }
   JobRecord record_of(const std::string& id) const;
-  v1::Job view(const JobRecord& record) const;  // with what the attempt has done since
+  JobRecord own_record(const Caller& caller, const std::string& id) const;  // of a job that the caller may act on
+  v1::Job view(const JobRecord& record) const;                              // with what the attempt has done since
   std::shared_ptr<Feed> feed_of(const v1::Job& job);
   void store(JobRecord& record, v1::JobState state, std::optional<Ending> why = std::nullopt);
   JobRecord& require(JobRecord& record, Request request, const char* wanted) const;
-  v1::Job request(const std::string& id, Request request, const char* wanted, v1::Control::Command command, bool skip_checkpoint);
+  v1::Job request(const Caller& caller, const std::string& id, Request request, const char* wanted, v1::Control::Command command,
+                  bool skip_checkpoint);
 
-  std::optional<v1::CreateJobResponse> earlier_answer(const v1::CreateJobRequest& request, const std::string& content) const;
+  std::optional<v1::CreateJobResponse> earlier_answer(const std::string& owner, const v1::CreateJobRequest& request,
+                                                      const std::string& content) const;
   void start_from(v1::CreateJobRequest& request, JobRecord& record) const;
-  // imported: a draft's folder with a checkpoint; the record then has its id and state already.
+  // The record has its owner. imported: a draft's folder with a checkpoint; the record then has its id and state already.
   v1::CreateJobResponse commit(JobRecord& record, const v1::CreateJobRequest& request, const std::string& content,
                                const JobFolder* imported = nullptr);
   v1::Case case_of(const JobRecord& record) const;

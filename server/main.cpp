@@ -1,8 +1,5 @@
 // bedflowd: the server; and, as `bedflowd run-attempt`, the runner of one attempt (runner.h).
-#include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/grpcpp.h>
-#include <grpcpp/health_check_service_interface.h>
-#include <grpcpp/resource_quota.h>
 #include <signal.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
@@ -11,6 +8,7 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <atomic>
 #include <cstdio>
 #include <cstdlib>
@@ -20,10 +18,12 @@
 #include <thread>
 
 #include "jobs.h"
+#include "listen.h"
 #include "runner.h"
 #include "security.h"
 #include "service.h"
 #include "studies.h"
+#include "tokens.h"
 #include "watch.h"
 
 namespace bedflow::server {
@@ -34,7 +34,7 @@ using namespace std::chrono_literals;
 
 struct Options {
   Settings settings;
-  std::string listen;
+  Listening listening;
   bool idle_exit = false;
   double idle_seconds = 10;
   double bookmark_seconds = 10;
@@ -53,25 +53,6 @@ void take_folder(const fs::path& data) {
     if (std::chrono::steady_clock::now() > deadline) throw std::runtime_error("another bedflowd serves " + data.string());
     std::this_thread::sleep_for(10ms);
   }
-}
-
-std::unique_ptr<grpc::Server> listen(const std::string& address, JobService& service, int& port) {
-  grpc::EnableDefaultHealthCheckService(true);
-  grpc::reflection::InitProtoReflectionServerBuilderPlugin();
-  grpc::ServerBuilder builder;
-  builder.AddListeningPort(address, grpc::InsecureServerCredentials(), &port);
-  builder.RegisterService(&service);
-  builder.SetMaxReceiveMessageSize(32 << 20);
-  builder.SetResourceQuota(grpc::ResourceQuota("bedflowd").Resize(512 << 20));
-  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, 1000);
-  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
-  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, 30'000);
-  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 20'000);
-  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
-  builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, 10'000);
-  auto server = builder.BuildAndStart();
-  if (!server) throw std::runtime_error("cannot listen on " + address);
-  return server;
 }
 
 // A round that fails (on a full disk, say) is tried again a second later.
@@ -103,21 +84,32 @@ void wait_for_end(const sigset_t& signals, const std::function<bool()>& has_noth
   ::umask(0077);
 
   const fs::path& data = options.settings.data;
-  if (options.listen.find(':') != std::string::npos && !options.listen.starts_with("unix:")) listen_address(options.listen);
+  if (options.listening.tls.given()) require_sound(options.listening.tls);
+  for (const auto& wanted : options.listening.wanted) {  // before a folder is made for a server that will not come up
+    if (!wanted.starts_with("unix:")) listen_address(wanted, options.listening.has_network());
+  }
   make_private(data);
   take_folder(data);
-  std::string address = listen_address(options.listen);
+  auto listened = addresses(options.listening, data);
+  Tokens tokens(data / "tokens.txtpb");
+  const Door door(tokens, options.listening.has_network());
   Jobs jobs(options.settings);
   Studies studies(jobs, data / "studies");
   Watchers watchers(std::chrono::milliseconds(static_cast<int>(1000 * options.bookmark_seconds)));
   Readers readers(options.reader);
-  JobService service(jobs, studies, watchers, readers, options.settings.programs.engine, address);
-  int port = 0;
-  const auto server = listen(address, service, port);
-  if (!address.starts_with("unix:")) address = address.substr(0, address.rfind(':') + 1) + std::to_string(port);
-  spdlog::info("bedflowd " BEDFLOW_VERSION " serves {} on {} with {} slots", data.string(), address, options.settings.slots);
-  std::printf("listening on %s\n", address.c_str());
+  JobService service(jobs, studies, watchers, readers, options.settings.programs.engine, door, tokens);
+  const auto server = listen(options.listening, listened, service, door, tokens);
+  std::string all;
+  for (const auto& address : listened) {
+    all += (all.empty() ? "" : ", ") + address;
+    spdlog::info("bedflowd " BEDFLOW_VERSION " serves {} on {} with {} slots", data.string(), address, options.settings.slots);
+    std::printf("listening on %s\n", address.c_str());
+  }
   std::fflush(stdout);
+  service.set_addresses(all);
+  if (options.listening.has_network() && tokens.empty())
+    spdlog::info("there are no tokens yet: bedflow server token create OWNER --scope submit --out FILE --server {}",
+                 *std::ranges::find_if(listened, [](const auto& address) { return address.starts_with("unix:"); }));
 
   std::atomic<bool> ending = false;
   auto last_round = std::chrono::steady_clock::now();
@@ -166,7 +158,16 @@ void add_server_options(CLI::App& app, Options& options) {
   settings.programs.engine = own_path().parent_path() / "bedflow-engine";
   options.reader.program = own_path().parent_path() / "bedflow-reader";
   app.add_option("--data", settings.data, "folder of the jobs and their catalogue; made private (mode 0700)");
-  app.add_option("--listen", options.listen, "unix:PATH or 127.0.0.1:PORT; unix:DATA/bedflowd.sock if absent");
+  auto& listening = options.listening;
+  app.add_option("--listen", listening.wanted,
+                 "unix:PATH, 127.0.0.1:PORT, or with TLS HOST:PORT; unix:DATA/bedflowd.sock if absent")
+      ->type_name("ADDRESS")
+      ->allow_extra_args(false);
+  app.add_option("--tls-certificate", listening.tls.certificate, "the server's certificate, PEM; callers over TLS need tokens")
+      ->type_name("FILE");
+  app.add_option("--tls-key", listening.tls.key, "its private key, PEM")->type_name("FILE");
+  app.add_option("--client-ca", listening.tls.client_ca, "clients need certificates of this authority too, PEM")
+      ->type_name("FILE");
   app.add_option("--slots", settings.slots, "ranks that may run at once")->capture_default_str()->check(CLI::Range(1, 100'000));
   app.add_option("--engine", settings.programs.engine, "the engine")->capture_default_str();
   app.add_option("--reader", options.reader.program, "opens checkpoints")->capture_default_str();
@@ -217,7 +218,6 @@ int run(int argc, char** argv) {
   options.settings.data = fs::absolute(options.settings.data).lexically_normal();
   options.reader.time = std::chrono::seconds(options.reader_seconds);
   options.settings.heartbeat_limit = std::chrono::seconds(static_cast<int>(options.heartbeat_seconds));
-  if (options.listen.empty()) options.listen = "unix:" + (options.settings.data / "bedflowd.sock").string();
   serve(options);
 }
 

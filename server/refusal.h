@@ -19,6 +19,10 @@ enum class Refused {
   series_not_found,      //
   wrong_state,           // the job's state does not allow it
   request_id_reused,     // the same id with another content
+  not_owner,             // the job is another's, and the caller no admin
+  scope_too_small,       // the caller's token does not go so far
+  token_not_found,       //
+  token_ended,           // it expired or was revoked while the call went on
   timed_out,             // not within the time given
   checkpoint_corrupt,    //
   checkpoint_changed,    // it is not the one that a download began with

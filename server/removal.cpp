@@ -23,11 +23,11 @@ std::uint64_t bytes_freed(const fs::path& folder) {
 
 }  // namespace
 
-std::uint64_t Jobs::remove(const std::string& id) {
+std::uint64_t Jobs::remove(const Caller& caller, const std::string& id) {
   const auto removed = settings_.data / "removed" / id;
   {
     const std::lock_guard guard(mutex_);
-    const JobRecord record = record_of(id);
+    const JobRecord record = own_record(caller, id);
     const auto state = record.job.state();
     if (live_.contains(id) || (!is_final(state) && state != v1::STATE_SUSPENDED)) {
       throw Refusal(Refused::wrong_state, "job " + id + " is " + state_word(state) + " and cannot be deleted before it has ended",

@@ -44,6 +44,15 @@ bool is_loopback_v4(std::string_view host) {
   }
 }
 
+// A name, an IPv4 address, or an IPv6 address in brackets.
+bool is_host(std::string_view host) {
+  const auto is_in_name = [](char c) { return is_letter(c) || is_digit(c) || c == '.' || c == '-'; };
+  const auto is_in_v6 = [](char c) { return is_lower_hex(c) || is_digit(c) || c == ':' || c == '.'; };
+  if (host.size() > 2 && host.front() == '[' && host.back() == ']')
+    return std::all_of(host.begin() + 1, host.end() - 1, is_in_v6);
+  return !host.empty() && host.size() <= 253 && std::all_of(host.begin(), host.end(), is_in_name);
+}
+
 std::string unix_address(const std::string& wanted) {
   const fs::path path = fs::absolute(wanted.substr(5)).lexically_normal();
   if (path.string().size() >= sizeof(sockaddr_un{}.sun_path)) {
@@ -64,7 +73,7 @@ std::string unix_address(const std::string& wanted) {
 
 }  // namespace
 
-std::string listen_address(const std::string& wanted) {
+std::string listen_address(const std::string& wanted, bool has_tls) {
   if (wanted.starts_with("unix:")) return unix_address(wanted);
   const auto colon = wanted.rfind(':');
   const std::string host = wanted.substr(0, colon);
@@ -75,14 +84,17 @@ std::string listen_address(const std::string& wanted) {
     if (error != std::errc() || stop != end) port = -1;
   }
   if (port < 0 || port > 65535) {
-    throw std::invalid_argument("'" + printable(wanted) + "' is not an address: use unix:PATH or 127.0.0.1:PORT");
+    throw std::invalid_argument("'" + printable(wanted) +
+                                "' is not an address: use unix:PATH or 127.0.0.1:PORT, or HOST:PORT with TLS");
   }
   if (host == "localhost") return "127.0.0.1:" + std::to_string(port);
   if (host == "[::1]" || is_loopback_v4(host)) return wanted;
+  if (has_tls && is_host(host)) return wanted;
   throw std::invalid_argument(
       "'" + printable(wanted) +
-      "' is not a loopback address: nothing listens beyond the machine without TLS and authentication, which are "
-      "not built yet; use 127.0.0.1:PORT or unix:PATH, and an SSH tunnel from elsewhere");
+      "' is not a loopback address: nothing listens beyond the machine without TLS and authentication; "
+      "add --tls-certificate FILE --tls-key FILE (callers then need tokens: bedflow server token create), "
+      "or use 127.0.0.1:PORT or unix:PATH, and an SSH tunnel from elsewhere");
 }
 
 void make_private(const fs::path& folder) {
@@ -106,6 +118,10 @@ bool is_label_key(std::string_view key) {
   const auto later = [](char c) { return is_lower(c) || is_digit(c) || c == '.' || c == '_' || c == '/' || c == '-'; };
   return !key.empty() && key.size() <= 63 && (is_lower(key.front()) || is_digit(key.front())) &&
          std::all_of(key.begin(), key.end(), later);
+}
+
+bool is_owner(std::string_view name) {
+  return is_label_key(name) && name.find('/') == name.npos;
 }
 
 std::string printable(std::string_view text) {

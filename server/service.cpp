@@ -37,6 +37,14 @@ Code code_of(Refused why) {
       return {grpc::StatusCode::FAILED_PRECONDITION, "WRONG_STATE"};
     case Refused::request_id_reused:
       return {grpc::StatusCode::ALREADY_EXISTS, "REQUEST_ID_REUSED"};
+    case Refused::not_owner:
+      return {grpc::StatusCode::PERMISSION_DENIED, "NOT_OWNER"};
+    case Refused::scope_too_small:
+      return {grpc::StatusCode::PERMISSION_DENIED, "SCOPE_TOO_SMALL"};
+    case Refused::token_not_found:
+      return {grpc::StatusCode::NOT_FOUND, "TOKEN_NOT_FOUND"};
+    case Refused::token_ended:
+      return {grpc::StatusCode::UNAUTHENTICATED, "TOKEN_ENDED"};
     case Refused::timed_out:
       return {grpc::StatusCode::DEADLINE_EXCEEDED, "TIMED_OUT"};
     case Refused::checkpoint_corrupt:
@@ -98,14 +106,14 @@ grpc::Status status_of_failure(const std::exception& failure) {
   return {grpc::StatusCode::INTERNAL, failure.what(), detail.SerializeAsString()};
 }
 
-JobService::Unary* JobService::answer(Context* context, Pace pace, std::function<void()> call) {
+JobService::Unary* JobService::answer(Context* context, Pace pace, std::function<void(const Caller&)> call) {
   last_call_ = std::chrono::steady_clock::now();
   ++calls_;
   Unary* reactor = context->DefaultReactor();
-  boost::asio::post(pool(pace), [this, reactor, call = std::move(call)] {
+  boost::asio::post(pool(pace), [this, context, reactor, call = std::move(call)] {
     grpc::Status status;
     try {
-      call();
+      call(door_.caller(*context));
     } catch (const std::exception& failure) {
       status = status_of_failure(failure);
     }
@@ -126,92 +134,103 @@ std::chrono::steady_clock::duration JobService::quiet() const {
 }
 
 JobService::Unary* JobService::CreateJob(Context* context, const v1::CreateJobRequest* request, v1::CreateJobResponse* response) {
-  return answer(context, Pace::slow, [=, this] { *response = jobs_.create(*request); });
+  return answer(context, Pace::slow, [=, this](const Caller& caller) { *response = jobs_.create(caller, *request); });
 }
 
 JobService::Unary* JobService::GetJob(Context* context, const v1::GetJobRequest* request, v1::Job* response) {
-  return answer(context, Pace::quick, [=, this] {
+  return answer(context, Pace::quick, [=, this](const Caller&) {
     *response = jobs_.get(request->id());
     if (request->with_case()) *response->mutable_case_() = jobs_.read_case(request->id());
   });
 }
 
 JobService::Unary* JobService::ListJobs(Context* context, const v1::ListJobsRequest* request, v1::ListJobsResponse* response) {
-  return answer(context, Pace::quick, [=, this] { *response = jobs_.list(*request); });
+  return answer(context, Pace::quick, [=, this](const Caller&) { *response = jobs_.list(*request); });
 }
 
-grpc::ServerWriteReactor<v1::WatchJobResponse>* JobService::WatchJob(Context*, const v1::WatchJobRequest* request) {
+grpc::ServerWriteReactor<v1::WatchJobResponse>* JobService::WatchJob(Context* context, const v1::WatchJobRequest* request) {
   last_call_ = std::chrono::steady_clock::now();
   try {
-    return watchers_.open(request->id(), jobs_.watch(request->id(), request->after_sequence(), request->from_now()));
+    return watchers_.open(request->id(), jobs_.watch(request->id(), request->after_sequence(), request->from_now()),
+                          door_.caller(*context));
   } catch (const std::exception& failure) {
     return new Refuse(status_of_failure(failure));
   }
 }
 
 JobService::Unary* JobService::CancelJob(Context* context, const v1::CancelJobRequest* request, v1::Job* response) {
-  return answer(context, Pace::quick, [=, this] { *response = jobs_.cancel(request->id(), request->skip_checkpoint()); });
+  return answer(context, Pace::quick,
+                [=, this](const Caller& caller) { *response = jobs_.cancel(caller, request->id(), request->skip_checkpoint()); });
 }
 
 JobService::Unary* JobService::SuspendJob(Context* context, const v1::SuspendJobRequest* request, v1::Job* response) {
-  return answer(context, Pace::quick, [=, this] { *response = jobs_.suspend(request->id()); });
+  return answer(context, Pace::quick, [=, this](const Caller& caller) { *response = jobs_.suspend(caller, request->id()); });
 }
 
 JobService::Unary* JobService::ResumeJob(Context* context, const v1::ResumeJobRequest* request, v1::Job* response) {
-  return answer(context, Pace::quick, [=, this] { *response = jobs_.resume(*request); });
+  return answer(context, Pace::quick, [=, this](const Caller& caller) { *response = jobs_.resume(caller, *request); });
 }
 
 JobService::Unary* JobService::QueryStatistics(Context* context, const v1::QueryStatisticsRequest* request,
                                                v1::Statistics* response) {
-  return answer(context, Pace::slow, [=, this] { *response = statistics_.query(jobs_.folder(request->id()), *request); });
+  return answer(context, Pace::slow,
+                [=, this](const Caller&) { *response = statistics_.query(jobs_.folder(request->id()), *request); });
 }
 
 JobService::Unary* JobService::ListSeries(Context* context, const v1::ListSeriesRequest* request,
                                           v1::ListSeriesResponse* response) {
-  return answer(context, Pace::slow, [=, this] { *response = statistics_.list(jobs_.folder(request->id()), request->id()); });
+  return answer(context, Pace::slow,
+                [=, this](const Caller&) { *response = statistics_.list(jobs_.folder(request->id()), request->id()); });
 }
 
 JobService::Unary* JobService::DeleteJob(Context* context, const v1::DeleteJobRequest* request, v1::DeleteJobResponse* response) {
-  return answer(context, Pace::slow, [=, this] { response->set_freed_bytes(jobs_.remove(request->id())); });
+  return answer(context, Pace::slow,
+                [=, this](const Caller& caller) { response->set_freed_bytes(jobs_.remove(caller, request->id())); });
 }
 
 JobService::Unary* JobService::GetCheckpoint(Context* context, const v1::GetCheckpointRequest* request,
                                              v1::Checkpoint* response) {
-  return answer(context, Pace::reading,
-                [=, this] { *response = get_checkpoint(readers_, jobs_.folder(request->name().job()), request->name()); });
+  return answer(context, Pace::reading, [=, this](const Caller&) {
+    *response = get_checkpoint(readers_, jobs_.folder(request->name().job()), request->name());
+  });
 }
 
 JobService::Unary* JobService::VerifyCheckpoint(Context* context, const v1::VerifyCheckpointRequest* request,
                                                 v1::VerifyCheckpointResponse* response) {
-  return answer(context, Pace::reading,
-                [=, this] { *response = verify_checkpoint(readers_, jobs_.folder(request->name().job()), request->name()); });
+  return answer(context, Pace::reading, [=, this](const Caller&) {
+    *response = verify_checkpoint(readers_, jobs_.folder(request->name().job()), request->name());
+  });
 }
 
 JobService::Unary* JobService::ListCheckpoints(Context* context, const v1::ListCheckpointsRequest* request,
                                                v1::ListCheckpointsResponse* response) {
-  return answer(context, Pace::slow, [=, this] { *response = list_checkpoints(jobs_.folder(request->id()), request->id()); });
+  return answer(context, Pace::slow,
+                [=, this](const Caller&) { *response = list_checkpoints(jobs_.folder(request->id()), request->id()); });
 }
 
 JobService::Unary* JobService::CreateCheckpoint(Context* context, const v1::CreateCheckpointRequest* request,
                                                 v1::Checkpoint* response) {
-  return answer(context, Pace::slow, [=, this] {
+  return answer(context, Pace::slow, [=, this](const Caller& caller) {
     const double limit = request->timeout_seconds();
     if (!std::isfinite(limit) || limit <= 0 || limit > 3600) {
       throw Refusal(Refused::bad_request, "timeout_seconds is " + std::to_string(limit) + "; allowed are above 0 to 3600 s");
     }
     const std::chrono::duration<double> given = context->deadline() - std::chrono::system_clock::now();
-    *response = jobs_.create_checkpoint(request->id(), std::min(std::chrono::duration<double>(limit), given));
+    *response = jobs_.create_checkpoint(caller, request->id(), std::min(std::chrono::duration<double>(limit), given));
   });
 }
 
 JobService::Unary* JobService::GetSnapshot(Context* context, const v1::GetSnapshotRequest* request, v1::Snapshot* response) {
-  return answer(context, Pace::reading, [=, this] { *response = snapshot(engine_, jobs_.folder(request->id()), *request); });
+  return answer(context, Pace::reading,
+                [=, this](const Caller&) { *response = snapshot(engine_, jobs_.folder(request->id()), *request); });
 }
 
 JobService::Unary* JobService::GetServerInfo(Context* context, const v1::GetServerInfoRequest*, v1::ServerInfo* response) {
-  return answer(context, Pace::quick, [=, this] {
+  return answer(context, Pace::quick, [=, this](const Caller& caller) {
     *response = jobs_.info();
-    response->set_address(address_);
+    response->set_address(address_.get());
+    response->set_caller(caller.owner);
+    response->set_caller_scope(caller.scope);
   });
 }
 

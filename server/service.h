@@ -8,14 +8,17 @@
 #include <chrono>
 #include <filesystem>
 #include <functional>
+#include <future>
 #include <string>
 
 #include "bedflow/v1/service.grpc.pb.h"
+#include "door.h"
 #include "jobs.h"
 #include "reader.h"
 #include "refusal.h"
 #include "statistics.h"
 #include "studies.h"
+#include "tokens.h"
 #include "watch.h"
 
 namespace bedflow::server {
@@ -26,11 +29,19 @@ grpc::Status status_of_failure(const std::exception& failure);  // of a Refusal 
 
 class JobService final : public v1::JobService::CallbackService {
  public:
-  JobService(Jobs& jobs, Studies& studies, Watchers& watchers, Readers& readers, std::filesystem::path engine, std::string address)
-      : jobs_(jobs), studies_(studies), watchers_(watchers), readers_(readers), engine_(std::move(engine)), address_(std::move(address)) {}
+  JobService(Jobs& jobs, Studies& studies, Watchers& watchers, Readers& readers, std::filesystem::path engine, const Door& door,
+             Tokens& tokens)
+      : jobs_(jobs),
+        studies_(studies),
+        watchers_(watchers),
+        readers_(readers),
+        engine_(std::move(engine)),
+        door_(door),
+        tokens_(tokens) {}
   ~JobService() override { wait_for_calls(); }
 
-  void wait_for_calls();                              // after the gRPC server's shutdown
+  void set_addresses(std::string text) { addresses_.set_value(std::move(text)); }  // to tell people; once
+  void wait_for_calls();                                                           // after the gRPC server's shutdown
   void drain() { draining_ = true; }                  // streams of statistics end: the server goes down
   std::size_t calls() const { return calls_; }        // in progress, watchers not counted
   std::chrono::steady_clock::duration quiet() const;  // since the last call
@@ -40,7 +51,7 @@ class JobService final : public v1::JobService::CallbackService {
   using Unary = grpc::ServerUnaryReactor;
   enum class Pace { quick, slow, reading };  // slow: asks the engine, or waits for it; reading: asks a reader of checkpoints
 
-  Unary* answer(Context* context, Pace pace, std::function<void()> call);
+  Unary* answer(Context* context, Pace pace, std::function<void(const Caller&)> call);
   template <class Response, class Source>
   grpc::ServerWriteReactor<Response>* stream(Context* context, Pace pace, Source source);
   boost::asio::thread_pool& pool(Pace pace) { return pace == Pace::quick ? quick_ : pace == Pace::slow ? slow_ : reading_; }
@@ -71,6 +82,9 @@ class JobService final : public v1::JobService::CallbackService {
   Unary* CancelStudy(Context*, const v1::CancelStudyRequest*, v1::Study*) override;
   Unary* DeleteStudy(Context*, const v1::DeleteStudyRequest*, v1::DeleteStudyResponse*) override;
   Unary* GetServerInfo(Context*, const v1::GetServerInfoRequest*, v1::ServerInfo*) override;
+  Unary* CreateToken(Context*, const v1::CreateTokenRequest*, v1::Token*) override;
+  Unary* ListTokens(Context*, const v1::ListTokensRequest*, v1::ListTokensResponse*) override;
+  Unary* RevokeToken(Context*, const v1::RevokeTokenRequest*, v1::RevokeTokenResponse*) override;
 
   Jobs& jobs_;
   Studies& studies_;
@@ -78,7 +92,10 @@ class JobService final : public v1::JobService::CallbackService {
   Readers& readers_;
   StatisticsLogs statistics_;
   const std::filesystem::path engine_;
-  const std::string address_;
+  const Door& door_;
+  Tokens& tokens_;
+  std::promise<std::string> addresses_;
+  std::shared_future<std::string> address_ = addresses_.get_future();
   std::atomic<std::chrono::steady_clock::time_point> last_call_ = std::chrono::steady_clock::now();
   std::atomic<std::size_t> calls_ = 0;
   std::atomic<bool> draining_ = false;

@@ -79,6 +79,7 @@ Studies::Studies(Jobs& jobs, std::filesystem::path folder) : jobs_(jobs), folder
       spdlog::error("the study in {} cannot be read and is left alone", entry.path().string());
       continue;
     }
+    if (!kept.study.has_owner()) kept.study.set_owner(local_owner);  // of a time when there were no others
     studies_.emplace(kept.study.id(), std::move(kept));
   }
 }
@@ -91,16 +92,24 @@ Studies::Kept& Studies::kept(const std::string& id) {
   return found->second;
 }
 
+Studies::Kept& Studies::own_kept(const Caller& caller, const std::string& id) {
+  Kept& found = kept(id);
+  if (caller.may_act_on(found.study.owner())) return found;
+  throw Refusal(Refused::not_owner,
+                "study " + id + " is " + found.study.owner() + "'s; " + caller.owner + " may look at it, but not act on it",
+                "bedflow study list");
+}
+
 void Studies::store(const Kept& kept) const {
   v1::Study without_spec = kept.study;
   without_spec.clear_spec();
   write_durably(folder_of(kept.study.id()) / "study.txtpb", without_spec);
 }
 
-std::optional<v1::Study> Studies::earlier_answer(const v1::CreateStudyRequest& request) const {
+std::optional<v1::Study> Studies::earlier_answer(const Caller& caller, const v1::CreateStudyRequest& request) const {
   if (request.request_id().empty()) return std::nullopt;
   for (const auto& [id, kept] : studies_) {
-    if (kept.study.request_id() != request.request_id()) continue;
+    if (kept.study.request_id() != request.request_id() || kept.study.owner() != caller.owner) continue;
     if (content_of(kept.study.spec()) == content_of(request.spec())) return kept.study;
     throw Refusal(Refused::request_id_reused, "request id " + request.request_id() + " has been used for " + id + ", another study",
                   "bedflow study get " + id);
@@ -108,14 +117,14 @@ std::optional<v1::Study> Studies::earlier_answer(const v1::CreateStudyRequest& r
   return std::nullopt;
 }
 
-v1::Study Studies::create(const v1::CreateStudyRequest& request) {
+v1::Study Studies::create(const Caller& caller, const v1::CreateStudyRequest& request) {
   if (request.has_request_id() && !is_request_id(request.request_id())) {
     throw Refusal(Refused::bad_request,
                   "request_id '" + printable(request.request_id()) + "' is not of the form [A-Za-z0-9-]{8,64}");
   }
   {
     const std::lock_guard guard(mutex_);
-    if (auto earlier = earlier_answer(request)) return *earlier;
+    if (auto earlier = earlier_answer(caller, request)) return *earlier;
   }
   const v1::StudySpec& spec = request.spec();
   std::vector<v1::Fault> faults;
@@ -129,7 +138,7 @@ v1::Study Studies::create(const v1::CreateStudyRequest& request) {
     *probe.mutable_spec() = spec.job();
     probe.set_validate_only(true);
     try {
-      jobs_.create(probe);
+      jobs_.create(caller, probe);
     } catch (const Refusal& refusal) {
       std::string values;
       for (const auto& value : spec.points(i).values()) values += (values.empty() ? "" : ", ") + printable(value);
@@ -141,10 +150,11 @@ v1::Study Studies::create(const v1::CreateStudyRequest& request) {
   kept.study.set_state(v1::STUDY_RUNNING);
   kept.study.set_created_unix_nanos(now_nanos());
   kept.study.set_request_id(request.request_id());
+  kept.study.set_owner(caller.owner);
   *kept.study.mutable_spec() = spec;
   for (int i = 0; i < spec.points_size(); ++i) kept.study.add_runs();
   const std::lock_guard guard(mutex_);
-  if (auto earlier = earlier_answer(request)) return *earlier;
+  if (auto earlier = earlier_answer(caller, request)) return *earlier;
   // Whoever finds the folder finds both files in it.
   const fs::path draft = folder_ / ("draft-" + kept.study.id());
   fs::create_directories(draft);
@@ -192,9 +202,9 @@ v1::ListStudiesResponse Studies::list() {
   return response;
 }
 
-v1::Study Studies::cancel(const std::string& id) {
+v1::Study Studies::cancel(const Caller& caller, const std::string& id) {
   const std::lock_guard guard(mutex_);
-  Kept& found = kept(id);
+  Kept& found = own_kept(caller, id);
   if (found.study.state() != v1::STUDY_RUNNING) {
     throw Refusal(Refused::wrong_state, "study " + id + " has ended and cannot be cancelled", "bedflow study get " + id);
   }
@@ -207,16 +217,16 @@ v1::Study Studies::cancel(const std::string& id) {
     if (run.has_job() && !run.reused()) jobs.push_back(run.job());
   for (const auto& job : jobs) {
     try {
-      jobs_.cancel(job, false);
+      jobs_.cancel(caller, job, false);
     } catch (const Refusal&) {  // it has ended
     }
   }
   return found.study;
 }
 
-std::uint64_t Studies::remove(const std::string& id, bool with_jobs) {
+std::uint64_t Studies::remove(const Caller& caller, const std::string& id, bool with_jobs) {
   const std::lock_guard guard(mutex_);
-  Kept& found = kept(id);
+  Kept& found = own_kept(caller, id);
   if (found.study.state() == v1::STUDY_RUNNING) {
     throw Refusal(Refused::wrong_state, "study " + id + " is running and cannot be deleted", "bedflow study cancel " + id);
   }
@@ -234,9 +244,9 @@ std::uint64_t Studies::remove(const std::string& id, bool with_jobs) {
   for (const auto& job : jobs) {
     if (!with_jobs || is_of_another(job)) continue;
     try {
-      freed += jobs_.remove(job);
+      freed += jobs_.remove(caller, job);
     } catch (const Refusal& refusal) {
-      if (refusal.why != Refused::job_not_found) throw;
+      if (refusal.why != Refused::job_not_found && refusal.why != Refused::not_owner) throw;  // a packing may be another's
     }
   }
   freed += bytes_of(folder_of(id));

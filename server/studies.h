@@ -23,11 +23,11 @@ class Studies {
   Studies(Jobs& jobs, std::filesystem::path folder);
 
   // Calls, from any thread. They throw Refusal.
-  v1::Study create(const v1::CreateStudyRequest& request);
+  v1::Study create(const Caller& caller, const v1::CreateStudyRequest& request);
   v1::Study get(const std::string& id);  // with errors and front, as far as the runs have come
   v1::ListStudiesResponse list();        // without cases, errors and front
-  v1::Study cancel(const std::string& id);
-  std::uint64_t remove(const std::string& id, bool with_jobs);  // bytes that are free again
+  v1::Study cancel(const Caller& caller, const std::string& id);
+  std::uint64_t remove(const Caller& caller, const std::string& id, bool with_jobs);  // bytes that are free again
 
   // Submits runs that are missing, stops those whose intervals are narrow enough, ends studies. From one thread.
   void advance();
@@ -45,8 +45,9 @@ class Studies {
 
   std::filesystem::path folder_of(const std::string& id) const { return folder_ / id; }
   Kept& kept(const std::string& id);
+  Kept& own_kept(const Caller& caller, const std::string& id);  // of a study that the caller may act on
   void store(const Kept& kept) const;
-  std::optional<v1::Study> earlier_answer(const v1::CreateStudyRequest& request) const;
+  std::optional<v1::Study> earlier_answer(const Caller& caller, const v1::CreateStudyRequest& request) const;
 
   void advance(Kept& kept);
   bool pack(Kept& kept);  // true: the packing is there, or none is wanted

@@ -37,6 +37,11 @@ std::optional<v1::StudyCost> cost_of(const std::filesystem::path& summary) {
   return cost;
 }
 
+// In whose name its runs are made and stopped.
+Caller owner_of(const v1::Study& study) {
+  return {study.owner(), v1::SUBMIT};
+}
+
 }  // namespace
 
 void Studies::advance() {
@@ -94,7 +99,7 @@ std::string Studies::create_job(const v1::Study& study, const std::string& name,
     request.mutable_start_from()->set_step(0);
     request.set_packing_only(true);
   }
-  return jobs_.create(request).job().id();
+  return jobs_.create(owner_of(study), request).job().id();
 }
 
 // The reference's particles, seeded and settled: a job of one step, whose checkpoint of step 0 all runs start from.
@@ -107,7 +112,7 @@ bool Studies::pack(Kept& kept) {
     *probe.mutable_case_() = value;
     *probe.mutable_spec() = study.spec().job();
     probe.set_validate_only(true);
-    value.mutable_time()->set_end(jobs_.create(probe).plan().step());
+    value.mutable_time()->set_end(jobs_.create(owner_of(study), probe).plan().step());
     value.clear_monitors();
     value.clear_references();
     value.clear_output();
@@ -177,7 +182,7 @@ void Studies::look_at(Kept& kept, int point) {
   if (so_far.quantities.empty()) return;
   run.set_interval_met(true);
   try {
-    jobs_.suspend(run.job());
+    jobs_.suspend(owner_of(kept.study), run.job());
   } catch (const Refusal&) {  // it has ended meanwhile
   }
 }

@@ -9,7 +9,8 @@ namespace bedflow::server {
 
 class Watcher : public grpc::ServerWriteReactor<v1::WatchJobResponse> {
  public:
-  Watcher(Watchers& all, std::string id, Cursor cursor) : all_(all), id_(std::move(id)), cursor_(std::move(cursor)) {}
+  Watcher(Watchers& all, std::string id, Cursor cursor, Caller caller)
+      : all_(all), id_(std::move(id)), caller_(std::move(caller)), cursor_(std::move(cursor)) {}
 
   // Sends what there is, if nothing is being sent. From any thread; at most one write is in flight.
   void go_on() {
@@ -57,6 +58,7 @@ class Watcher : public grpc::ServerWriteReactor<v1::WatchJobResponse> {
            "bedflow watch " + id_});
     }
     try {
+      caller_.require_still_good();
       auto response = cursor_.next();
       if (!response && cursor_.has_ended()) return grpc::Status::OK;
       if (!response && std::chrono::steady_clock::now() - last_write_ >= all_.bookmark_after_) {
@@ -76,6 +78,7 @@ class Watcher : public grpc::ServerWriteReactor<v1::WatchJobResponse> {
 
   Watchers& all_;
   const std::string id_;
+  const Caller caller_;
   std::mutex mutex_;
   Cursor cursor_;
   v1::WatchJobResponse message_;
@@ -85,8 +88,8 @@ class Watcher : public grpc::ServerWriteReactor<v1::WatchJobResponse> {
   std::chrono::steady_clock::time_point last_write_ = std::chrono::steady_clock::now();
 };
 
-grpc::ServerWriteReactor<v1::WatchJobResponse>* Watchers::open(const std::string& id, Cursor cursor) {
-  auto watcher = std::make_shared<Watcher>(*this, id, std::move(cursor));
+grpc::ServerWriteReactor<v1::WatchJobResponse>* Watchers::open(const std::string& id, Cursor cursor, Caller caller) {
+  auto watcher = std::make_shared<Watcher>(*this, id, std::move(cursor), std::move(caller));
   {
     const std::lock_guard guard(mutex_);
     watchers_.emplace(id, watcher);

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "bedflow/v1/service.pb.h"
+#include "caller.h"
 #include "follow.h"
 
 namespace bedflow::server {
@@ -24,7 +25,7 @@ class Watchers {
   explicit Watchers(std::chrono::milliseconds bookmark_after) : bookmark_after_(bookmark_after) {}
 
   // gRPC owns what this returns, until it is done with it.
-  grpc::ServerWriteReactor<v1::WatchJobResponse>* open(const std::string& id, Cursor cursor);
+  grpc::ServerWriteReactor<v1::WatchJobResponse>* open(const std::string& id, Cursor cursor, Caller caller);
   void wake(const std::set<std::string>& ids);
   void wake_all();  // those that are due a bookmark send it
   void drain();     // ends all streams: the server goes down, the jobs do not

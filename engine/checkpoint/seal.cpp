@@ -45,6 +45,7 @@ const std::vector<std::byte>& zeros() {
 template <class Number>
 bool take_hex(std::string_view& line, std::size_t digits, Number& number) {
   if (line.size() < digits + 1 || line[0] != ' ') return false;
+  if (line.substr(1, digits).find_first_not_of("0123456789abcdef") != std::string_view::npos) return false;  // as it is written
   const char* const first = line.data() + 1;
   const auto [end, error] = std::from_chars(first, first + digits, number, 16);
   line.remove_prefix(digits + 1);

@@ -103,7 +103,8 @@ class RealServer:
         with open(self.path / "server.log", "ab") as log:
             self.process = subprocess.Popen([BIN / "bedflowd", "--data", self.path / "data", *self._options], stdout=subprocess.PIPE,
                                             stderr=log, text=True)
-        if "listening" not in self.process.stdout.readline():
+        self.said = self.process.stdout.readline()
+        if "listening" not in self.said:
             raise RuntimeError((self.path / "server.log").read_text())
 
     def kill(self):

@@ -3,14 +3,15 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import os
-import pathlib
+import re
 from collections.abc import Callable, Iterator
 from typing import Any
 
 import grpc
 
 from bedflow.v1 import service_pb2, service_pb2_grpc
+
+from .contexts import Context, read_pem, read_token
 
 CALL_SECONDS = 60.0
 LARGEST_MESSAGE = 512 << 20
@@ -22,14 +23,6 @@ _SERVICE = json.dumps({"methodConfig": [{
     "name": [{"service": "bedflow.v1.JobService", "method": method} for method in _REPEATED],
     "retryPolicy": {"maxAttempts": 4, "initialBackoff": "0.1s", "maxBackoff": "0.5s", "backoffMultiplier": 2,
                     "retryableStatusCodes": ["UNAVAILABLE"]}}]})
-
-
-def default_address() -> str:
-    """BEDFLOW_SERVER, or the socket where a bedflowd without options listens."""
-    if address := os.environ.get("BEDFLOW_SERVER"):
-        return address
-    state = os.environ.get("XDG_STATE_HOME") or pathlib.Path.home() / ".local/state"
-    return f"unix:{pathlib.Path(state) / 'bedflow/bedflowd.sock'}"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -59,7 +52,11 @@ def error_of(failure: grpc.RpcError) -> Error:
         if key == "grpc-status-details-bin":
             detail.ParseFromString(value)
     faults = tuple(Fault(fault.path, fault.text) for fault in detail.faults)
-    return Error(detail.reason or failure.code().name, failure.details() or "no answer", detail.next, faults)
+    message = failure.details() or "no answer"
+    at_the_door = re.search(r" \[([A-Z_]+)\]$", message)  # turned away before the request was read: no details
+    if at_the_door and not detail.reason:
+        return Error(at_the_door[1], message[:at_the_door.start()])
+    return Error(detail.reason or failure.code().name, message, detail.next, faults)
 
 
 def may_come_back(error: Error) -> bool:
@@ -67,15 +64,27 @@ def may_come_back(error: Error) -> bool:
     return error.reason in ("UNAVAILABLE", "CANCELLED", "GOING_DOWN")
 
 
+def _channel(context: Context, options: list[tuple[str, Any]]) -> grpc.Channel:
+    """Over TLS whenever the way leaves the machine, or the context has something for TLS; with its token on every call."""
+    if not context.wants_tls:
+        return grpc.insecure_channel(context.server, options)
+    credentials = grpc.ssl_channel_credentials(
+        read_pem(context.ca) if context.ca else None, read_pem(context.key, is_private=True) if context.key else None,
+        read_pem(context.certificate) if context.certificate else None)
+    if context.token:
+        credentials = grpc.composite_channel_credentials(credentials, grpc.access_token_call_credentials(read_token(context.token)))
+    return grpc.secure_channel(context.server, credentials, options)
+
+
 class Connection:
     """A channel and its calls; each call raises Error."""
 
-    def __init__(self, address: str):
-        self.address = address
+    def __init__(self, context: Context):
+        self.address = context.server
         options = [("grpc.max_receive_message_length", LARGEST_MESSAGE), ("grpc.enable_http_proxy", 0),
                    ("grpc.keepalive_time_ms", 30_000), ("grpc.initial_reconnect_backoff_ms", 100),
                    ("grpc.min_reconnect_backoff_ms", 100), ("grpc.max_reconnect_backoff_ms", 1000), ("grpc.service_config", _SERVICE)]
-        self._channel = grpc.insecure_channel(address, options)
+        self._channel = _channel(context, options)
         self.stub = service_pb2_grpc.JobServiceStub(self._channel)
 
     def close(self) -> None:

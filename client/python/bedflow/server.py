@@ -13,7 +13,8 @@ from google.protobuf import json_format, text_format
 from bedflow.v1 import case_pb2, fields_pb2, job_pb2, service_pb2
 
 from .checksum import crc32c
-from .connection import CALL_SECONDS, Connection, Error, default_address, may_come_back
+from .connection import CALL_SECONDS, Connection, Error, may_come_back
+from .contexts import Context, PathLike, read_context
 from .results import Field, FieldParts, Profile, Reduced, Series
 
 PART_BYTES = 1 << 20
@@ -41,8 +42,8 @@ def _state_name(state: int) -> str:
 class Server:
     """A connection to a bedflowd. Use it in a with statement, or close it."""
 
-    def __init__(self, address: str | None = None):
-        self._connection = Connection(address or default_address())
+    def __init__(self, context: Context):
+        self._connection = Connection(context)
 
     def __enter__(self) -> Server:
         return self
@@ -129,9 +130,20 @@ class Server:
         return request
 
 
-def connect(address: str | None = None) -> Server:
-    """A server by its gRPC address: "unix:/path/bedflowd.sock" or "127.0.0.1:port". Nothing is sent yet."""
-    return Server(address)
+def connect(address: str | None = None, *, ca: PathLike | None = None, certificate: PathLike | None = None, key: PathLike | None = None,
+            token: PathLike | None = None, context: str | None = None) -> Server:
+    """A server by its address, "unix:/path/bedflowd.sock", "127.0.0.1:port" or, over TLS, "host:port"; or by the name of a context of
+    `bedflow context`; or, without either, the one that `bedflow` would take. Nothing is sent yet.
+
+    ca, certificate, key and token are files: the authorities that may vouch for the server (the system's if absent), the client's own
+    certificate and key for servers that ask for one, and the token. A key or a token that others may read raises PermissionError."""
+    if address is None:
+        if any((ca, certificate, key, token)):
+            raise ValueError("ca, certificate, key and token go with an address; a context has its own")
+        return Server(read_context(context))
+    if context is not None:
+        raise ValueError("an address and a context both name a server")
+    return Server(Context(address, ca, certificate, key, token))
 
 
 class Job:
