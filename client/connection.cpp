@@ -124,7 +124,8 @@ Connection::Connection(const v1::Context& context) : context_(context), address_
   arguments.SetMaxReceiveMessageSize(largest_message);
   arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);  // an engine's server is near: no proxy stands between
   arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 100);
-  arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, 100);
+  // How long one attempt may take, in gRPC's words: a handshake over a network, or on a machine that is busy.
+  arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, wants_tls(context_) ? 10'000 : 1000);
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 1000);
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, 30'000);
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 20'000);

@@ -120,7 +120,8 @@ v1::CreateJobResponse Jobs::create(const Caller& caller, const v1::CreateJobRequ
     if (request.has_start_from()) start_from(request, record);
   }
   if (request.packing_only() && !request.has_start_from()) {
-    throw Refusal(Refused::bad_request, "packing_only needs start_from: whose particles?", "bedflow submit CASE --packing-of JOB");
+    throw Refusal(Refused::bad_request, "packing_only needs start_from: whose particles?",
+                  "bedflow submit CASE --packing-of JOB");
   }
   if (!request.has_case_())
     throw Refusal(Refused::bad_request, "the request has neither a case nor start_from", "bedflow init mueller");

@@ -127,7 +127,8 @@ void wait_for_end(const sigset_t& signals, const std::function<bool()>& has_noth
   std::thread study_supervisor([&] { supervise(attend_studies, ending); });
   const std::chrono::duration<double> patience(options.idle_seconds);
   wait_for_end(signals, [&] {
-    return options.idle_exit && service.quiet() > patience && service.calls() + watchers.count() == 0 && jobs.is_idle() && studies.is_idle();
+    return options.idle_exit && service.quiet() > patience && service.calls() + watchers.count() == 0 && jobs.is_idle() &&
+           studies.is_idle();
   });
   spdlog::info("going down; what runs goes on running");
   watchers.drain();

@@ -1,5 +1,5 @@
-// Any bytes as a checkpoint's seal and manifest. The first byte chooses: the manifest's text; a text whose seal is good, in a file
-// that is then checked block by block; or the file as it is.
+// Any bytes as a checkpoint's seal and manifest. The first byte chooses: the manifest's text; a text whose seal is good, in a
+// file that is then checked block by block; or the file as it is.
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>

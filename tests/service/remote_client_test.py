@@ -1,4 +1,5 @@
-"""The command line against a server beyond the machine: contexts, tokens, and what it says when it is turned away."""
+"""The command line and the Python client against a server beyond the machine: contexts, tokens, and what they say when they are
+turned away."""
 import json
 import os
 import pathlib
@@ -6,14 +7,19 @@ import stat
 import subprocess
 import tempfile
 import unittest
+import unittest.mock
 
+import bedflow
+from bedflow.v1 import context_pb2, service_pb2
+from google.protobuf import text_format
 from real_server import BIN, bed, wait_until
-from secure_server import SecureServer, make_certificates
+from secure_server import SecureServer, SlowWay, make_certificates
 
 
 def setUpModule():
-    global server
+    global server, strict
     server = unittest.enterModuleContext(SecureServer())
+    strict = unittest.enterModuleContext(SecureServer(wants_certificates=True))
 
 
 class RemoteClient(unittest.TestCase):
@@ -124,11 +130,21 @@ class RemoteClient(unittest.TestCase):
         self.assertIn("[NOT_OWNER]", denied)
         self.bedflow("cancel", job, "--skip-checkpoint", "--server", server.address)
         self.assertTrue(wait_until(lambda: "[TOKEN_EXPIRED]" in self.run_it("list", "--context", "brief").stderr))
-        self.assertEqual(self.run_it("list", "--context", "brief").returncode, 4)
+        self.bedflow("list", "--context", "brief", code=4)
         self.bedflow("server", "token", "revoke", "--owner", "bob", "--server", server.address)
         denied = self.bedflow("list", "--context", "reader", code=4).stderr
         self.assertIn("[TOKEN_UNKNOWN]", denied)
         self.assertIn("bedflow server token create", denied)
+
+    def test_a_server_that_is_far_away_is_reached(self):
+        """A handshake over ways of 150 ms takes longer than a near server is given."""
+        token = self.token_file("frank", "read")
+        with SlowWay(int(server.network.rpartition(":")[2]), 0.15) as way:
+            address = f"localhost:{way.port}"
+            self.add("far", "--token", token, server_address=address)
+            self.assertIn("frank, READ", self.bedflow("server", "info").stdout)
+            with bedflow.connect(address, ca=server.keys / "ca.pem", token=token) as there:
+                self.assertEqual(there.info().caller, "frank")
 
     def test_a_server_that_cannot_be_trusted_is_left_alone(self):
         stranger = self.home / "stranger"
@@ -198,6 +214,46 @@ class Start(unittest.TestCase):
             self.assertIn("--tls-key FILE is missing", self.refused(*listen, "--tls-certificate", pem))
             self.assertIn("--tls-certificate FILE is missing", self.refused(*listen, "--client-ca", pem))
             self.assertIn("--client-ca", self.refused(*listen, "--tls-certificate", pem, "--tls-key", key, "--client-ca", key))
+
+
+class PythonContexts(unittest.TestCase):
+    def test_are_the_same_to_the_python_client(self):
+        token = server.token("alice", service_pb2.SUBMIT)
+        folder = pathlib.Path(tempfile.mkdtemp(dir=server.path))
+        with unittest.mock.patch.dict("os.environ", XDG_CONFIG_HOME=str(folder)):
+            self.assertEqual(bedflow.read_context().server, bedflow.default_address())
+            contexts = context_pb2.Contexts(current="lab")
+            contexts.contexts.add(name="lab", server=server.network, ca=str(server.keys / "ca.pem"), token=str(token.file))
+            (folder / "bedflow").mkdir()
+            (folder / "bedflow/contexts.txtpb").write_text(text_format.MessageToString(contexts))
+            for how in ({}, {"context": "lab"}):
+                with bedflow.connect(**how) as there:
+                    self.assertEqual(there.info().caller, "alice")
+            with self.assertRaises(KeyError):
+                bedflow.connect(context="other")
+
+
+class PythonClient(unittest.TestCase):
+    def test_takes_authority_certificate_and_token(self):
+        make_certificates(strict.keys, "--client", "python")
+        token = strict.token("alice", service_pb2.SUBMIT)
+        pair = {"certificate": strict.keys / "python.pem", "key": strict.keys / "python.key"}
+        with bedflow.connect(strict.network, ca=strict.keys / "ca.pem", token=token.file, **pair) as there:
+            self.assertEqual(there.info().caller, "alice")
+            self.assertEqual(there.submit(bed(end=0.002)).wait(60).message.owner, "alice")
+        with bedflow.connect(strict.network, ca=strict.keys / "ca.pem", **pair) as there, self.assertRaises(bedflow.Error) as caught:
+            there.info()
+        self.assertEqual(caught.exception.reason, "TOKEN_MISSING")
+
+    def test_uses_no_token_and_no_key_that_others_can_read(self):
+        token = server.token("alice", service_pb2.READ)
+        token.file.chmod(0o640)
+        with self.assertRaises(PermissionError):
+            server.connect_as(token)
+        token.file.chmod(0o600)
+        token.file.write_text("my password")
+        with self.assertRaises(ValueError):
+            server.connect_as(token)
 
 
 if __name__ == "__main__":

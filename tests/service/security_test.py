@@ -9,12 +9,10 @@ import socket
 import tempfile
 import time
 import unittest
-import unittest.mock
 
 import bedflow
 import grpc
-from bedflow.v1 import context_pb2, fields_pb2, job_pb2, service_pb2, study_pb2
-from google.protobuf import text_format
+from bedflow.v1 import fields_pb2, job_pb2, service_pb2, study_pb2
 from real_server import bed, wait_until
 from secure_server import OTHERS, SERVICE, SecureServer, make_certificates, outcome, path_of, reason_of
 
@@ -367,46 +365,6 @@ class Certificates(unittest.TestCase):
             self.assertEqual(self.info(other, before), OK)
             shutil.copy(renewed / "server.key", other.keys / "server.key")
             self.assertTrue(wait_until(lambda: self.info(other, other.channel(token, ca=renewed / "ca.pem")) == OK))
-
-
-class Contexts(unittest.TestCase):
-    def test_are_the_same_to_the_python_client(self):
-        token = server.token("alice", SUBMIT)
-        folder = pathlib.Path(tempfile.mkdtemp(dir=server.path))
-        with unittest.mock.patch.dict("os.environ", XDG_CONFIG_HOME=str(folder)):
-            self.assertEqual(bedflow.read_context().server, bedflow.default_address())
-            contexts = context_pb2.Contexts(current="lab")
-            contexts.contexts.add(name="lab", server=server.network, ca=str(server.keys / "ca.pem"), token=str(token.file))
-            (folder / "bedflow").mkdir()
-            (folder / "bedflow/contexts.txtpb").write_text(text_format.MessageToString(contexts))
-            for how in ({}, {"context": "lab"}):
-                with bedflow.connect(**how) as there:
-                    self.assertEqual(there.info().caller, "alice")
-            with self.assertRaises(KeyError):
-                bedflow.connect(context="other")
-
-
-class PythonClient(unittest.TestCase):
-    def test_takes_authority_certificate_and_token(self):
-        make_certificates(foreign.keys, "--client", "python")
-        token = foreign.token("alice", SUBMIT)
-        pair = {"certificate": foreign.keys / "python.pem", "key": foreign.keys / "python.key"}
-        with bedflow.connect(foreign.network, ca=foreign.keys / "ca.pem", token=token.file, **pair) as there:
-            self.assertEqual(there.info().caller, "alice")
-            self.assertEqual(there.submit(bed(end=0.002)).wait(60).message.owner, "alice")
-        with bedflow.connect(foreign.network, ca=foreign.keys / "ca.pem", **pair) as there, self.assertRaises(bedflow.Error) as caught:
-            there.info()
-        self.assertEqual(caught.exception.reason, "TOKEN_MISSING")
-
-    def test_uses_no_token_and_no_key_that_others_can_read(self):
-        token = server.token("alice", READ)
-        token.file.chmod(0o640)
-        with self.assertRaises(PermissionError):
-            server.connect_as(token)
-        token.file.chmod(0o600)
-        token.file.write_text("my password")
-        with self.assertRaises(ValueError):
-            server.connect_as(token)
 
 
 if __name__ == "__main__":

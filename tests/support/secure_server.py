@@ -3,8 +3,10 @@ import hashlib
 import os
 import pathlib
 import secrets
+import socket
 import subprocess
 import tempfile
+import threading
 import time
 
 import bedflow
@@ -85,6 +87,43 @@ class SecureServer(RealServer):
         """Bytes of memory that the server has."""
         status = pathlib.Path(f"/proc/{self.process.pid}/status").read_text()
         return int(status.split("VmRSS:")[1].split()[0]) * 1024
+
+
+class SlowWay:
+    """A port of this machine that leads to another, as from afar: what goes through is so many seconds under way. In a with statement."""
+
+    def __init__(self, port, seconds):
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self.port = self._listener.getsockname()[1]
+        self._target, self._seconds = port, seconds
+
+    def __enter__(self):
+        threading.Thread(target=self._accept, daemon=True).start()
+        return self
+
+    def __exit__(self, *_):
+        self._listener.shutdown(socket.SHUT_RDWR)
+        self._listener.close()
+
+    def _accept(self):
+        while True:
+            try:
+                near, _ = self._listener.accept()
+            except OSError:
+                return
+            far = socket.create_connection(("127.0.0.1", self._target))
+            for source, sink in ((near, far), (far, near)):
+                threading.Thread(target=self._carry, args=(source, sink), daemon=True).start()
+
+    def _carry(self, source, sink):
+        with source:
+            try:
+                while said := source.recv(1 << 16):
+                    time.sleep(self._seconds)  # the way itself, not a wait for anything
+                    sink.sendall(said)
+                sink.shutdown(socket.SHUT_WR)
+            except OSError:
+                pass
 
 
 def outcome(channel, path, request=b"", metadata=(), seconds=20):

@@ -81,9 +81,11 @@ class Connection:
 
     def __init__(self, context: Context):
         self.address = context.server
+        # min_reconnect_backoff is how long one attempt may take, in gRPC's words: a handshake over a network, or on a busy machine.
         options = [("grpc.max_receive_message_length", LARGEST_MESSAGE), ("grpc.enable_http_proxy", 0),
                    ("grpc.keepalive_time_ms", 30_000), ("grpc.initial_reconnect_backoff_ms", 100),
-                   ("grpc.min_reconnect_backoff_ms", 100), ("grpc.max_reconnect_backoff_ms", 1000), ("grpc.service_config", _SERVICE)]
+                   ("grpc.min_reconnect_backoff_ms", 10_000 if context.wants_tls else 1000), ("grpc.max_reconnect_backoff_ms", 1000),
+                   ("grpc.service_config", _SERVICE)]
         self._channel = _channel(context, options)
         self.stub = service_pb2_grpc.JobServiceStub(self._channel)
 
