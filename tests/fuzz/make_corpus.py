@@ -1,8 +1,8 @@
-#!/usr/bin/env python3
+#!/usr/bin/python3
 """Writes the inputs that the fuzz targets begin with, by the programs themselves: cases as `bedflow init` gives them, in text and
 JSON, the logs of a small bed that has run, and the manifest of its checkpoint.
 
-usage: tests/fuzz/make_corpus.py [folder of the programs, build/release/bin if absent]
+usage: /usr/bin/python3 tests/fuzz/make_corpus.py [folder of the programs, build/release/bin if absent]
 """
 import pathlib
 import struct
@@ -46,6 +46,10 @@ def main(programs):
 
     for name in ("settling", "drop", "drum", "mueller", "channel"):
         write("case", name, run("bedflow", "init", name).encode())
+    sys.path.insert(0, str(programs.parent / "python"))
+    from bedflow import read_case
+    from google.protobuf import json_format
+    write("case", "bed_json", json_format.MessageToJson(read_case(BED), preserving_proto_field_name=True).encode())
     with tempfile.TemporaryDirectory() as folder:
         folder = pathlib.Path(folder)
         (folder / "case.txtpb").write_text(BED)
