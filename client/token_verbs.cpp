@@ -19,7 +19,7 @@ namespace {
 
 struct TokenOptions {
   std::string owner, id, out;
-  v1::Scope scope = v1::SCOPE_NONE;
+  std::string scope;
   std::string expires = "90d";
   Format format = Format::table;
 };
@@ -86,7 +86,7 @@ Exit create(const Program& program, const TokenOptions& options) {
   auto& token = *request.mutable_token();
   token.set_id(text.id);
   token.set_owner(options.owner);
-  token.set_scope(options.scope);
+  token.set_scope(options.scope == "admin" ? v1::ADMIN : options.scope == "submit" ? v1::SUBMIT : v1::READ);
   token.set_secret_sha256(sha256(text.secret));
   token.set_expires_unix_nanos(now_nanos() + std::chrono::nanoseconds(life(options.expires)).count());
   const Connection connection(program.server);
@@ -122,7 +122,6 @@ Exit revoke(const Program& program, const TokenOptions& options) {
 }  // namespace
 
 void add_token_verbs(CLI::App* server, Program& program) {
-  static const std::map<std::string, v1::Scope> scopes = {{"read", v1::READ}, {"submit", v1::SUBMIT}, {"admin", v1::ADMIN}};
   auto* token = server->add_subcommand("token", "who may use the server from beyond the machine");
   token->require_subcommand(1);
   const auto verb = [&](const char* name, const char* meaning, Exit (*function)(const Program&, const TokenOptions&)) {
@@ -134,7 +133,7 @@ void add_token_verbs(CLI::App* server, Program& program) {
   const auto [creates, created] = verb("create", "let somebody in", create);
   creates->add_option("owner", created->owner, "whose jobs it makes and may act on: a-z 0-9 . _ -")->required();
   creates->add_option("--scope", created->scope, "read: look at all jobs; submit: and make and steer own ones; admin: steer all")
-      ->transform(CLI::CheckedTransformer(scopes).description(""))
+      ->check(CLI::IsMember({"read", "submit", "admin"}).description(""))
       ->type_name("SCOPE")
       ->required();
   creates->add_option("--expires", created->expires, "how long it holds")->type_name("90d|12h|30m|45s")->capture_default_str();

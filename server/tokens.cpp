@@ -24,7 +24,7 @@ v1::Token without_hash(v1::Token token) {
 }
 
 Caller caller_with(std::shared_ptr<const KnownToken> known) {
-  return {known->token.owner(), known->token.scope(), known};
+  return {known->token.owner(), known->token.scope(), std::move(known)};
 }
 
 void require_sound(const v1::Token& token) {
@@ -78,7 +78,7 @@ v1::Token Tokens::add(v1::Token token) {
   Known changed = known_;
   auto& known = changed[token.id()] = std::make_shared<KnownToken>();
   known->token = std::move(token);
-  const v1::Token made = without_hash(known->token);
+  v1::Token made = without_hash(known->token);
   store(changed);  // before anybody can use it
   known_ = std::move(changed);
   return made;

@@ -169,6 +169,8 @@ class RemoteClient(unittest.TestCase):
         create = ["server", "token", "create"]
         self.bedflow(*create, "alice", "--scope", "read", "--out", path, "--server", server.address, code=2)
         self.assertEqual(path.read_text(), "mine")
+        self.assertIn("--scope: all not in {read,submit,admin}",
+                      self.bedflow(*create, "alice", "--scope", "all", "--out", self.home / "new", code=2).stderr)
         for owner, more in (("../x", []), ("local", []), ("alice", ["--expires", "11y"]), ("alice", ["--expires", "99999d"])):
             self.bedflow(*create, owner, "--scope", "read", "--out", self.home / "new", *more, "--server", server.address, code=2)
             self.assertFalse((self.home / "new").exists())
