@@ -6,6 +6,7 @@
 
 #include "case_file.h"
 
+// NOLINTNEXTLINE(readability-identifier-naming): libFuzzer's name
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const auto read = bedflow::read_case(std::string(reinterpret_cast<const char*>(data), size));
   if (!read.faults.empty()) return 0;
