@@ -11,6 +11,7 @@
 #include "case_source.h"
 #include "cases/ready_cases.h"
 #include "child.h"
+#include "parameter_lines.h"
 #include "terminal.h"
 #include "verbs.h"
 
@@ -140,10 +141,19 @@ Exit explain(const Program&, const CaseOptions& options) {
   return Exit::ok;
 }
 
-struct ReferenceOptions {};
+struct ReferenceOptions {
+  Format format = Format::table;
+};
 
-Exit reference(const Program&, const ReferenceOptions&) {
-  print_data(parameter_reference());
+Exit reference(const Program&, const ReferenceOptions& options) {
+  if (options.format == Format::table) {
+    print_data(parameter_reference());
+    return Exit::ok;
+  }
+  Table table({"block", "field", "type", "unit", "default", "allowed", "meaning"});
+  for (const auto& one : parameter_lines())
+    table.add({one.block, one.field, one.type, one.unit, one.otherwise, one.allowed, one.meaning});
+  print_data(table.text(options.format));
   return Exit::ok;
 }
 
@@ -166,7 +176,9 @@ void add_case_verbs(CLI::App& app, Program& program) {
   on_call(verb, program, check_options, validate);
 
   verb = app.add_subcommand("reference", "print the reference of all parameters: meaning, unit, bounds, default");
-  on_call(verb, program, std::make_shared<ReferenceOptions>(), reference);
+  const auto reference_options = std::make_shared<ReferenceOptions>();
+  add_format(verb, reference_options->format);
+  on_call(verb, program, reference_options, reference);
 
   const auto plan_options = std::make_shared<CaseOptions>();
   verb = app.add_subcommand("explain", "print what a case requires: what is on and why, steps, cells, memory, time");

@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <mutex>
+#include <optional>
 #include <thread>
 
 #include "terminal.h"
@@ -133,7 +134,8 @@ Connection::Connection(const v1::Context& context) : context_(context), address_
 }
 
 grpc::Status Connection::run(const Attempt& attempt, double seconds) const {
-  const WaitingNote note(address_);
+  std::optional<WaitingNote> note;
+  if (!quiet_) note.emplace(address_);
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() + std::chrono::milliseconds(static_cast<std::int64_t>(seconds * 1e3)));
   return attempt(&context);

@@ -42,6 +42,8 @@ class Connection {
 
   v1::Job get_job(const std::string& id, bool with_case = false) const;
 
+  void set_quiet() { quiet_ = true; }  // nobody is told that an answer is waited for
+
   Stub& stub() const { return *stub_; }
   const std::string& address() const { return address_; }
   Failure failure_of(const grpc::Status& status) const;
@@ -52,6 +54,7 @@ class Connection {
 
   v1::Context context_;
   std::string address_;
+  bool quiet_ = false;
   std::unique_ptr<Stub> stub_;
 };
 

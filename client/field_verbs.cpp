@@ -21,13 +21,16 @@ struct FieldOptions {
   Format format = Format::table;
 };
 
+[[noreturn]] void refuse_range(const std::string& range) {
+  throw Failure(Exit::usage, "\"" + range + "\" is no range: it is LOW:HIGH in m, either of which may be left out",
+                "bedflow field --help");
+}
+
 std::optional<double> edge_of(const std::string& range, const std::string& text) {
   if (text.empty()) return std::nullopt;
   double value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size())
-    throw Failure(Exit::usage, "\"" + range + "\" is no range: it is LOW:HIGH in m, either of which may be left out",
-                  "bedflow field --help");
+  if (error != std::errc() || end != text.data() + text.size()) refuse_range(range);
   return value;
 }
 
@@ -36,9 +39,7 @@ void set_range(const std::string& range, const std::function<void(double)>& set_
                const std::function<void(double)>& set_high) {
   if (range.empty()) return;
   const auto colon = range.find(':');
-  if (colon == range.npos)
-    throw Failure(Exit::usage, "\"" + range + "\" is no range: it is LOW:HIGH in m, either of which may be left out",
-                  "bedflow field --help");
+  if (colon == range.npos) refuse_range(range);
   if (const auto low = edge_of(range, range.substr(0, colon))) set_low(*low);
   if (const auto high = edge_of(range, range.substr(colon + 1))) set_high(*high);
 }
@@ -56,34 +57,32 @@ v1::FieldQuery query_of(const FieldOptions& options) {
   return query;
 }
 
+Exit ask_and_print(const Program& program, const FieldOptions& options, const v1::FieldQuery& query, bool histogram = false) {
+  auto source = options.source;
+  source.server = program.server;
+  print_field(ask_field(source, query), options.format, histogram);
+  return Exit::ok;
+}
+
 Exit slice(const Program& program, const FieldOptions& options) {
   auto query = query_of(options);
   query.mutable_slice()->set_axis(options.axis);
   if (options.place) query.mutable_slice()->set_place(*options.place);
-  auto source = options.source;
-  source.server = program.server;
-  print_field(ask_field(source, query), options.format);
-  return Exit::ok;
+  return ask_and_print(program, options, query);
 }
 
 Exit profile(const Program& program, const FieldOptions& options) {
   auto query = query_of(options);
   query.mutable_profile()->set_axis(options.axis);
   if (options.bins) query.mutable_profile()->set_bins(*options.bins);
-  auto source = options.source;
-  source.server = program.server;
-  print_field(ask_field(source, query), options.format);
-  return Exit::ok;
+  return ask_and_print(program, options, query);
 }
 
 Exit sample(const Program& program, const FieldOptions& options) {
   auto query = query_of(options);
   query.mutable_sample()->set_most(options.most);
   query.mutable_sample()->set_seed(options.seed);
-  auto source = options.source;
-  source.server = program.server;
-  print_field(ask_field(source, query), options.format);
-  return Exit::ok;
+  return ask_and_print(program, options, query);
 }
 
 Exit reduce(const Program& program, const FieldOptions& options) {
@@ -92,10 +91,7 @@ Exit reduce(const Program& program, const FieldOptions& options) {
   if (options.bins) reduction.set_histogram_bins(*options.bins);
   if (options.low) reduction.set_histogram_low(*options.low);
   if (options.high) reduction.set_histogram_high(*options.high);
-  auto source = options.source;
-  source.server = program.server;
-  print_field(ask_field(source, query), options.format, options.bins.has_value());
-  return Exit::ok;
+  return ask_and_print(program, options, query, options.bins.has_value());
 }
 
 using Verb = Exit (*)(const Program&, const FieldOptions&);

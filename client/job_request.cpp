@@ -44,6 +44,12 @@ void add_job_options(CLI::App* verb, JobOptions& options) {
   verb->add_option("--checkpoint-every", options.checkpoint_every, "simulated time between checkpoints, s")
       ->check(CLI::PositiveNumber);
   verb->add_option("--checkpoint-steps", options.checkpoint_steps, "steps between checkpoints")->check(CLI::PositiveNumber);
+  verb->add_option("--keep", options.keep, "so many of the newest checkpoints stay")
+      ->check(CLI::Range(2, 1000000))
+      ->default_str("2");
+  verb->add_option("--keep-every", options.keep_every, "and of the older ones every so-manieth")->check(CLI::PositiveNumber);
+  verb->add_option("--keep-every-time", options.keep_every_time, "and the first in each such span of simulated time, s")
+      ->check(CLI::PositiveNumber);
   verb->add_option("--wall-limit", options.wall_limit, "stop after so much wall time, s")->check(CLI::PositiveNumber);
   verb->add_option("--label", options.labels, "label to find the job by")->type_name("NAME=VALUE");
 }
@@ -60,6 +66,9 @@ v1::CreateJobRequest create_request(const JobOptions& options) {
   spec.set_ranks(options.ranks.value_or(1));
   if (options.checkpoint_every) spec.mutable_checkpoints()->set_every_simulated_seconds(*options.checkpoint_every);
   if (options.checkpoint_steps) spec.mutable_checkpoints()->set_every_steps(*options.checkpoint_steps);
+  if (options.keep) spec.mutable_checkpoints()->set_keep(*options.keep);
+  if (options.keep_every) spec.mutable_checkpoints()->set_keep_every_nth(*options.keep_every);
+  if (options.keep_every_time) spec.mutable_checkpoints()->set_keep_every_simulated_seconds(*options.keep_every_time);
   if (options.wall_limit) spec.set_wall_limit_seconds(*options.wall_limit);
   set_labels(spec, options.labels);
   return request;

@@ -18,8 +18,10 @@ struct JobOptions {
   std::optional<std::uint32_t> ranks;      // 1 if absent
   std::optional<double> checkpoint_every;  // simulated s
   std::optional<std::uint64_t> checkpoint_steps;
-  std::optional<double> wall_limit;  // s
-  std::vector<std::string> labels;   // name=value
+  std::optional<std::uint32_t> keep, keep_every;  // checkpoints
+  std::optional<double> keep_every_time;          // simulated s
+  std::optional<double> wall_limit;               // s
+  std::vector<std::string> labels;                // name=value
 };
 
 void add_job_options(CLI::App* verb, JobOptions& options);

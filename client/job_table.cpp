@@ -59,14 +59,22 @@ Table table_of(const v1::Job& job) {
   if (job.has_start_from_job())
     table.add({"started from", job.start_from_job() + ", step " + std::to_string(job.start_from_step())});
   for (const auto& one : job.overrides()) table.add({"changed " + one.path(), one.from() + " -> " + one.to()});
+  if (!job.waits_for().empty()) table.add({"waits for", job.waits_for()});
+  if (job.has_memory_bytes()) table.add({"memory", bytes_text(static_cast<double>(job.memory_bytes()))});
+  if (job.has_rank_seconds()) table.add({"ranks x time", duration_text(job.rank_seconds())});
+  if (job.pinned()) table.add({"pinned", "yes"});
+  for (const auto step : job.pinned_steps()) table.add({"pinned checkpoint", std::to_string(step)});
   for (const auto& [name, value] : job.spec().labels()) table.add({"label " + name, value});
   if (!job.folder().empty()) table.add({"folder", job.folder()});
   return table;
 }
 
 Table table_of(const std::vector<v1::Checkpoint>& checkpoints) {
-  Table table({"step", "time_s", "bytes", "file"});
-  for (const auto& one : checkpoints) table.add({one.step(), one.time(), one.bytes(), one.file()});
+  Table table({"step", "time_s", "bytes", "stays", "file"});
+  for (const auto& one : checkpoints) {
+    const std::string stays = one.pinned() ? "pinned" : one.stays() ? "by policy" : "";
+    table.add({one.step(), one.time(), one.bytes(), stays.empty() ? Cell() : Cell(stays), one.file()});
+  }
   return table;
 }
 

@@ -109,6 +109,7 @@ Exit list(const Program& program, const ListOptions& options) {
 struct DeleteOptions {
   std::vector<std::string> jobs;
   bool yes = false;
+  Format format = Format::table;
 };
 
 Exit delete_jobs(const Program& program, const DeleteOptions& options) {
@@ -129,12 +130,15 @@ Exit delete_jobs(const Program& program, const DeleteOptions& options) {
       return Exit::cancelled;
     }
   }
+  Table table({"job", "freed_bytes"});
   for (const auto& id : options.jobs) {
     v1::DeleteJobRequest request;
     request.set_id(id);
     const auto response = connection.call(&Stub::DeleteJob, request, 120);
+    table.add({id, response.freed_bytes()});
     say(id + " is deleted; " + bytes_text(static_cast<double>(response.freed_bytes())) + " are free again");
   }
+  if (options.format != Format::table) print_data(table.text(options.format));
   return Exit::ok;
 }
 
@@ -183,6 +187,22 @@ Exit resume(const Program& program, const OneJobOptions& options) {
   return show_changed(Connection(program.server).call(&Stub::ResumeJob, request, 60), options.format);
 }
 
+struct PinOptions {
+  std::string job;
+  bool pinned = true;
+  Format format = Format::table;
+};
+
+Exit set_pin(const Program& program, const PinOptions& options) {
+  v1::SetPinRequest request;
+  *request.mutable_name() = checkpoint_name(options.job);
+  request.set_pinned(options.pinned);
+  const auto job = Connection(program.server).call(&Stub::SetPin, request);
+  if (options.format != Format::table) print_message(job, table_of(std::vector{job}), options.format);
+  say(options.job + (options.pinned ? " stays until: bedflow unpin " + options.job : " is no longer pinned"));
+  return Exit::ok;
+}
+
 }  // namespace
 
 void add_job_verbs(CLI::App& app, Program& program) {
@@ -213,6 +233,7 @@ void add_job_verbs(CLI::App& app, Program& program) {
   verb = app.add_subcommand("delete", "delete jobs that have ended, with all that they left");
   verb->add_option("job", delete_options->jobs, "ids of the jobs")->required();
   verb->add_flag("--yes", delete_options->yes, "do not ask");
+  add_format(verb, delete_options->format);
   on_call(verb, program, delete_options, delete_jobs);
 
   const auto one_job = [&](const char* name, const char* meaning, Exit (*function)(const Program&, const OneJobOptions&)) {
@@ -223,10 +244,20 @@ void add_job_verbs(CLI::App& app, Program& program) {
     on_call(verb, program, options, function);
     return options;
   };
+  const auto pin_verb = [&](const char* name, const char* meaning, bool pinned) {
+    auto options = std::make_shared<PinOptions>();
+    options->pinned = pinned;
+    verb = app.add_subcommand(name, meaning);
+    verb->add_option("job", options->job, "id of the job; with @STEP that checkpoint alone")->required()->type_name("JOB[@STEP]");
+    add_format(verb, options->format);
+    on_call(verb, program, options, set_pin);
+  };
   const auto get_options = one_job("get", "show a job", get);
   verb->add_flag("--case", get_options->with_case, "its effective case");
   const auto cancel_options = one_job("cancel", "stop a job for good, after a checkpoint", cancel);
   verb->add_flag("--skip-checkpoint", cancel_options->skip_checkpoint, "stop at once, without a checkpoint");
+  pin_verb("pin", "keep a job, or one of its checkpoints, whatever retention says", true);
+  pin_verb("unpin", "let a pinned job or checkpoint go again", false);
   one_job("suspend", "write a checkpoint and stop until resumed", suspend);
   const auto resume_options = one_job("resume", "go on from a checkpoint", resume);
   verb->add_option("--step", resume_options->step, "checkpoint of this step; the newest good one if absent");

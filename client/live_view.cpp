@@ -52,6 +52,12 @@ class LiveView {
   std::optional<v1::JobState> state_;
 };
 
+std::string removed_text(const v1::CheckpointWritten& written) {
+  std::string steps;
+  for (const auto step : written.removed_steps()) steps += (steps.empty() ? "" : ", ") + std::to_string(step);
+  return steps.empty() ? "" : "; removed: step " + steps;
+}
+
 }  // namespace
 
 std::string event_line(const v1::Event& event) {
@@ -66,7 +72,7 @@ std::string event_line(const v1::Event& event) {
     case v1::Event::kCheckpoint:
       return "checkpoint of step " + std::to_string(event.checkpoint().step()) +
              ", t = " + number_text(event.checkpoint().time()) + " s, " +
-             bytes_text(static_cast<double>(event.checkpoint().bytes()));
+             bytes_text(static_cast<double>(event.checkpoint().bytes())) + removed_text(event.checkpoint());
     case v1::Event::kLog: {
       const auto severity = event.log().severity();
       return (severity == v1::LogLine::INFO      ? ""

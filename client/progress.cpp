@@ -17,24 +17,10 @@ double share_done(const v1::Progress& progress) {
   return progress.end_time() > 0 ? std::clamp(progress.time() / progress.end_time(), 0.0, 1.0) : 0;
 }
 
-std::string bar(double share, int cells, bool unicode) {
-  const auto full = static_cast<int>(share * cells);
-  std::string text;
-  for (int i = 0; i < cells; ++i) text += i < full ? (unicode ? "█" : "#") : (unicode ? "░" : "-");
-  return text;
-}
-
 std::string fixed(double value, int digits) {
   std::array<char, 40> text{};
   std::snprintf(text.data(), text.size(), "%.*f", digits, value);
   return text.data();
-}
-
-// Three significant digits; never the form 1e-05 that nobody reads at a glance, down to 0.0001.
-std::string rate_text(double value) {
-  if (value <= 0 || value < 1e-4) return number_text(value);
-  const int digits = std::clamp(2 - static_cast<int>(std::floor(std::log10(value))), 0, 7);
-  return fixed(value, digits);
 }
 
 double eta(const v1::Progress& progress, const SpeedGauge& speed) {
@@ -44,6 +30,19 @@ double eta(const v1::Progress& progress, const SpeedGauge& speed) {
 }
 
 }  // namespace
+
+std::string progress_bar(double share, int cells, bool unicode) {
+  const auto full = static_cast<int>(share * cells);
+  std::string text;
+  for (int i = 0; i < cells; ++i) text += i < full ? (unicode ? "█" : "#") : (unicode ? "░" : "-");
+  return text;
+}
+
+std::string rate_text(double value) {
+  if (value <= 0 || value < 1e-4) return number_text(value);
+  const int digits = std::clamp(2 - static_cast<int>(std::floor(std::log10(value))), 0, 7);
+  return fixed(value, digits);
+}
 
 void SpeedGauge::add(const v1::Progress& progress) {
   const Point point = {progress.wall_seconds(), progress.time(), static_cast<double>(progress.step())};
@@ -83,7 +82,7 @@ std::string progress_line(const v1::Progress& progress, const SpeedGauge& speed,
   }
   if (width < 60) return text;
   const int cells = std::min(width - static_cast<int>(display_width(text)) - brackets, widest_bar);
-  return "[" + bar(share, cells, unicode) + "] " + text;
+  return "[" + progress_bar(share, cells, unicode) + "] " + text;
 }
 
 void ProgressDisplay::update(const v1::Progress& progress) {

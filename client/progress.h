@@ -29,6 +29,10 @@ class SpeedGauge {
 // left out first.
 std::string progress_line(const v1::Progress& progress, const SpeedGauge& speed, int width, bool unicode);
 
+std::string progress_bar(double share, int cells, bool unicode);
+// Three significant digits; never the form 1e-05 that nobody reads at a glance, down to 0.0001.
+std::string rate_text(double value);
+
 class ProgressDisplay {
  public:
   using Clock = std::chrono::steady_clock;

@@ -224,7 +224,8 @@ std::string study_plot(const v1::Study& study, const std::filesystem::path& file
       const std::string colour = " lc " + std::to_string(index + 1);
       draws += (draws.empty() ? "" : ", \\\n  ") + block + " using 1:2:3 with yerrorlines pt 7 ps 0.9 lw 1.3" + colour +
                " title " + gnuplot_quoted(line) + ", \\\n  " + block +
-               " using 1:2:4 with labels left rotate by 45 offset 0.4,0.5 font \",10\" tc lt " + std::to_string(index + 1) + " notitle";
+               " using 1:2:4 with labels left rotate by 45 offset 0.4,0.5 font \",10\" tc lt " + std::to_string(index + 1) +
+               " notitle";
       ++index;
     }
     text += "set title " + gnuplot_quoted(quantity_name(spec.quantities(q))) + " font \",15\"\n";

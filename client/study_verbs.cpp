@@ -52,7 +52,8 @@ std::vector<std::size_t> reference_of(const std::vector<Axis>& axes, const std::
 }
 
 // The points as indices of values: the reference first, then one axis at a time, or all combinations.
-std::vector<std::vector<std::size_t>> points_of(const std::vector<Axis>& axes, const std::vector<std::size_t>& reference, bool grid) {
+std::vector<std::vector<std::size_t>> points_of(const std::vector<Axis>& axes, const std::vector<std::size_t>& reference,
+                                                bool grid) {
   std::vector<std::vector<std::size_t>> points = {reference};
   if (!grid) {
     for (std::size_t a = 0; a < axes.size(); ++a) {
@@ -97,8 +98,9 @@ void set_averaging(v1::Case& value, const v1::StudySpec& spec, const StudyOption
     const double end = value.time().end(), from = options.from.value_or(0.2 * end), bin = options.bin.value_or((end - from) / 10);
     const double bins = std::floor((end - from) / bin + 1e-9);
     if (!(bins >= 2)) {
-      throw Failure(Exit::usage, "from " + number_text(from) + " s to the end at " + number_text(end) + " s there are " +
-                                     number_text(std::max(0.0, bins)) + " bins of " + number_text(bin) + " s; an interval needs 2",
+      throw Failure(Exit::usage,
+                    "from " + number_text(from) + " s to the end at " + number_text(end) + " s there are " +
+                        number_text(std::max(0.0, bins)) + " bins of " + number_text(bin) + " s; an interval needs 2",
                     "--end later, --from earlier or --bin shorter");
     }
     auto& averaging = *monitor->mutable_averaging();
@@ -116,8 +118,10 @@ void require_sound(const v1::Case& value, const std::string& point) {
 
 v1::StudySpec spec_of(const StudyOptions& options) {
   if (options.vary.empty() || options.quantities.empty()) {
-    throw Failure(Exit::usage, options.vary.empty() ? "--vary is missing: what is to differ?" : "--quantity is missing: what is to be compared?",
-                  "bedflow study mueller --vary substeps=1,5,20 --quantity bed_height --end 4");
+    throw Failure(
+        Exit::usage,
+        options.vary.empty() ? "--vary is missing: what is to differ?" : "--quantity is missing: what is to be compared?",
+        "bedflow study mueller --vary substeps=1,5,20 --quantity bed_height --end 4");
   }
   v1::CreateJobRequest base = create_request(options);
   if (!base.case_().has_name()) base.mutable_case_()->set_name("study");
@@ -164,7 +168,8 @@ std::string progress_of(const v1::Study& study) {
     if (run.has_state() && (is_final(run.state()) || run.interval_met())) ++ended;
     if (run.state() != v1::RUNNING || run.interval_met()) continue;
     if (running++ < 3)
-      now += (now.empty() ? "; now " : ", ") + point_name(study.spec(), i) + " at " + number_text(std::round(100 * run.done())) + " %";
+      now += (now.empty() ? "; now " : ", ") + point_name(study.spec(), i) + " at " + number_text(std::round(100 * run.done())) +
+             " %";
   }
   if (running > 3) now += " and " + std::to_string(running - 3) + " more";
   if (ended == 0 && running == 0 && study.has_packing_job()) now = "; the particles are being packed";
@@ -263,7 +268,8 @@ Exit get(const Program& program, const OneStudyOptions& options) {
   Interrupt interrupt;
   const auto study = options.wait ? follow(connection, options.study, interrupt, nullptr) : get_study(connection, options.study);
   if (!study) return Exit::interrupted;
-  if (options.format == Format::table) say("study " + study->id() + " is " + study_state_name(study->state()) + ": " + progress_of(*study));
+  if (options.format == Format::table)
+    say("study " + study->id() + " is " + study_state_name(study->state()) + ": " + progress_of(*study));
   print_study(*study, options.format);
   if (!options.plot.empty()) draw(*study, options.plot);
   return options.wait ? end_of(*study) : Exit::ok;
@@ -318,7 +324,8 @@ void add_study_verbs(CLI::App& app, Program& program) {
       ->check(CLI::PositiveNumber);
   study->add_option("--interval", options->interval, "stop a run once all its half-widths are below so many % of the means")
       ->check(CLI::Range(0.0, 100.0));
-  study->add_flag("--own-packings", options->own_packings, "every run seeds and settles its own bed; otherwise all start from one");
+  study->add_flag("--own-packings", options->own_packings,
+                  "every run seeds and settles its own bed; otherwise all start from one");
   study->add_flag("--anew", options->anew, "run again what an earlier job has run already");
   study->add_option("--name", options->name, "of the study; the case's if absent");
   study->add_option("--data", options->data, "on a server of its own that keeps its jobs in this folder, as run does");
@@ -329,7 +336,8 @@ void add_study_verbs(CLI::App& app, Program& program) {
     if (study->get_subcommands().empty()) program.verb = [&program, options] { return begin(program, *options); };
   });
 
-  const auto one = [&](const char* name, const char* meaning, bool needs_id, Exit (*function)(const Program&, const OneStudyOptions&)) {
+  const auto one = [&](const char* name, const char* meaning, bool needs_id,
+                       Exit (*function)(const Program&, const OneStudyOptions&)) {
     auto chosen = std::make_shared<OneStudyOptions>();
     auto* verb = study->add_subcommand(name, meaning);
     if (needs_id) verb->add_option("study", chosen->study, "id of the study")->required();

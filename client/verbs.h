@@ -28,6 +28,8 @@ void add_study_verbs(CLI::App& app, Program& program);       // study
 void add_server_verbs(CLI::App& app, Program& program);      // server
 void add_token_verbs(CLI::App* server, Program& program);    // server token
 void add_context_verbs(CLI::App& app, Program& program);     // context
+void add_top_verb(CLI::App& app, Program& program);          // top
+void add_completion_verbs(CLI::App& app, Program& program);  // completion
 
 // The verb's function is called once the whole line has been parsed.
 template <class Options>

@@ -158,6 +158,7 @@ std::string Run::begin() {
   }
   last_checkpoint_time_ = simulation_->time();
   last_checkpoint_step_ = simulation_->steps();
+  if (comm_.root() && policy_.keep_every_nth > 0) since_kept_ = checkpoints_since_kept(options_.folder);
   good_checkpoint_step_ = found->step;
   next_plot_ =
       plan_.scene.plot_interval ? static_cast<std::int64_t>(simulation_->time() / *plan_.scene.plot_interval + 1e-9) + 1 : 0;

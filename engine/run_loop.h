@@ -51,6 +51,7 @@ class Run {
   void report_schema();
   StatisticsSink sink();
   void write_checkpoint_now();
+  bool checkpoint_stays();
   std::string at_checkpoint() const;
   std::string case_text() const;
   void write_plots_due();
@@ -73,6 +74,7 @@ class Run {
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
   double next_look_ = 0, last_progress_ = 0, last_checkpoint_time_ = 0, last_checkpoint_wall_ = 0, settling_seconds_ = 0;
   std::uint64_t last_checkpoint_step_ = 0;  // written, or tried
+  std::uint64_t since_kept_ = 0;            // checkpoints since the last that stays by policy_.keep_every_nth; on rank 0
   std::optional<std::uint64_t> good_checkpoint_step_;
   std::int64_t next_plot_ = 0;
 };

@@ -1,4 +1,5 @@
 // What a run writes: progress, checkpoints, plot files, statistics.
+#include <cmath>
 #include <fstream>
 #include <sstream>
 
@@ -32,19 +33,32 @@ void Run::write_checkpoint_now() {
   content.numbers["guard/halvings"] = halvings_;
   add_statistics(*monitors_, content);
   content.arrays.push_back({"case", "", "the effective case, protobuf text format", case_text(), {}, 1});
+  const bool stays = checkpoint_stays();
   last_checkpoint_step_ = simulation_->steps();
   last_checkpoint_time_ = simulation_->time();
   folder_.sync();  // statistics up to here are on the disk before the checkpoint is
   try {
     if (comm_.any(folder_.has_unwritten())) throw Stop(Reason::disk_full, "the disk has no room for what comes before it");
-    const CheckpointInfo info = write_checkpoint(comm_, options_.folder / "checkpoints", content, policy_.keep, options_.epoch);
+    const CheckpointInfo info =
+        write_checkpoint(comm_, options_.folder / "checkpoints", content, {policy_.keep, stays}, options_.epoch);
     good_checkpoint_step_ = info.step;
-    folder_.checkpoint(info.path.filename().string(), info.step, info.time, info.bytes, wall_seconds() - before);
+    since_kept_ = stays ? 0 : since_kept_ + 1;
+    folder_.checkpoint(
+        {info.path.filename().string(), info.step, info.time, info.bytes, wall_seconds() - before, stays, info.removed});
   } catch (const Stop& stop) {  // on every rank alike
     if (stop.reason != Reason::disk_full || !policy_.go_on_when_full) throw;
     folder_.warning("no checkpoint of step " + std::to_string(last_checkpoint_step_) + ", the run goes on: " + stop.what());
   }
   last_checkpoint_wall_ = wall_seconds();
+}
+
+// By count, and as the first in its span of simulated time.
+bool Run::checkpoint_stays() {
+  const double span = policy_.keep_every_simulated;
+  const auto spans = [&](double time) { return std::floor(time / span * (1 + 1e-12)); };
+  const bool by_count = policy_.keep_every_nth > 0 && since_kept_ + 1 >= policy_.keep_every_nth;
+  const bool by_time = span > 0 && spans(simulation_->time()) > spans(last_checkpoint_time_);
+  return by_count || by_time;
 }
 
 // Where the run can be taken up: on a full disk that may be an earlier one than the last that was due.

@@ -1,9 +1,10 @@
 // The parameter reference and the list of laws, from the descriptors alone.
 #include <google/protobuf/descriptor.h>
 
-#include <set>
+#include <algorithm>
 
 #include "case_file.h"
+#include "parameter_lines.h"
 #include "parameter_text.h"
 
 namespace bedflow {
@@ -98,13 +99,19 @@ std::string section(const Descriptor& type) {
   return text;
 }
 
-// Sections of a message and of those that it holds, each once, in the order in which a reader meets them.
-void append_sections(const Descriptor& type, std::set<std::string>& seen, std::string& text) {
-  if (!seen.insert(type.name()).second) return;
-  text += section(type);
+// A message and those that it holds, each once, in the order in which a reader meets them.
+void append_blocks(const Descriptor& type, std::vector<const Descriptor*>& blocks) {
+  if (std::find(blocks.begin(), blocks.end(), &type) != blocks.end()) return;
+  blocks.push_back(&type);
   for (int i = 0; i < type.field_count(); ++i) {
-    if (type.field(i)->message_type() != nullptr) append_sections(*type.field(i)->message_type(), seen, text);
+    if (type.field(i)->message_type() != nullptr) append_blocks(*type.field(i)->message_type(), blocks);
   }
+}
+
+std::vector<const Descriptor*> all_blocks() {
+  std::vector<const Descriptor*> blocks;
+  append_blocks(*v1::Case::descriptor(), blocks);
+  return blocks;
 }
 
 void append_laws(const Descriptor& type, const std::string& path, std::vector<std::string>& laws) {
@@ -126,9 +133,22 @@ std::string parameter_reference() {
       "A list is written by\nrepeating its name. JSON with the same names is read too. SI units, angles in radians; x is the "
       "width, y "
       "points up, z is the\ndepth, and the domain's low corner is the origin. Numbers must be finite.\n";
-  std::set<std::string> seen;
-  append_sections(*v1::Case::descriptor(), seen, text);
+  for (const Descriptor* block : all_blocks()) text += section(*block);
   return text;
+}
+
+std::vector<ParameterLine> parameter_lines() {
+  std::vector<ParameterLine> lines;
+  for (const Descriptor* block : all_blocks()) {
+    for (int i = 0; i < block->field_count(); ++i) {
+      const FieldDescriptor& field = *block->field(i);
+      const std::string type =
+          field.message_type() ? (field.is_repeated() ? "list of " : "") + field.message_type()->name() : type_text(field);
+      lines.push_back({block->name(), field.name(), type, parameter_of(field).unit(), default_text(field), allowed_values(field),
+                       parameter_of(field).meaning()});
+    }
+  }
+  return lines;
 }
 
 std::vector<std::string> built_laws() {

@@ -6,6 +6,7 @@
 #include <boost/math/distributions/students_t.hpp>
 #include <cerrno>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <stdexcept>
 #include <string_view>
@@ -32,7 +33,7 @@ constexpr auto deviation_of = [](const v1::BinClosed& bin) -> const auto& {
   return bin.deviation();
 };
 
-// The bytes of the sample, if the record is one: tag and length are a byte each. Read so, a log of a million samples costs half.
+// The bytes of the sample, if the record is one: tag and length are a byte each.
 std::string_view sample_in(std::string_view payload) {
   constexpr int length_delimited = 2;
   constexpr char tag = v1::StatisticsRecord::kSampleFieldNumber << 3 | length_delimited;
@@ -41,15 +42,58 @@ std::string_view sample_in(std::string_view payload) {
   return is_sample ? payload.substr(2) : std::string_view();
 }
 
+// One value of a varint; false at the end of the bytes.
+bool take_varint(std::string_view& bytes, std::uint64_t& value) {
+  value = 0;
+  for (int shift = 0; shift < 64 && !bytes.empty(); shift += 7) {
+    const auto byte = static_cast<unsigned char>(bytes.front());
+    bytes.remove_prefix(1);
+    value |= static_cast<std::uint64_t>(byte & 0x7f) << shift;
+    if (byte < 0x80) return true;
+  }
+  return false;
+}
+
+bool take_tag(std::string_view& bytes, char tag) {
+  if (bytes.empty() || bytes.front() != tag) return false;
+  bytes.remove_prefix(1);
+  return true;
+}
+
+bool take_double(std::string_view& bytes, double& value) {
+  if (bytes.size() < sizeof value) return false;
+  std::memcpy(&value, bytes.data(), sizeof value);
+  bytes.remove_prefix(sizeof value);
+  return true;
+}
+
+struct PlainSample {
+  std::uint64_t monitor = 0, step = 0;
+  double time = 0, value = 0;
+};
+
+// A sample with its four fields in their order, as engines write it; nothing for any other: protobuf reads that. A million
+// samples are read in half the time.
+std::optional<PlainSample> plain_sample(std::string_view bytes) {
+  constexpr char varint = 0, fixed64 = 1;
+  constexpr auto tag = [](int field, char type) { return static_cast<char>(field << 3 | type); };
+  PlainSample sample;
+  const bool is_plain = take_tag(bytes, tag(v1::Sample::kMonitorFieldNumber, varint)) && take_varint(bytes, sample.monitor) &&
+                        take_tag(bytes, tag(v1::Sample::kStepFieldNumber, varint)) && take_varint(bytes, sample.step) &&
+                        take_tag(bytes, tag(v1::Sample::kTimeFieldNumber, fixed64)) && take_double(bytes, sample.time) &&
+                        take_tag(bytes, tag(v1::Sample::kValueFieldNumber, fixed64)) && take_double(bytes, sample.value) &&
+                        bytes.empty();
+  return is_plain ? std::optional(sample) : std::nullopt;
+}
+
 }  // namespace
 
 void StatisticsLog::update() {
   v1::StatisticsRecord record;
-  v1::Sample sample;
   const bool whole = reader_.read([&](const LogRecord& framed) {
-    const std::string_view bytes = sample_in(framed.payload);
-    if (!bytes.empty() && sample.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())))
-      take(sample);
+    const auto sample = plain_sample(sample_in(framed.payload));
+    if (sample)
+      take(sample->monitor, {sample->step, sample->time, sample->value});
     else if (record.ParseFromString(framed.payload))
       take(record);
   });
@@ -60,9 +104,8 @@ void StatisticsLog::update() {
   }
 }
 
-void StatisticsLog::take(const v1::Sample& sample) {
-  if (sample.monitor() < monitors_.size())
-    monitors_[sample.monitor()].samples.push_back({sample.step(), sample.time(), sample.value()});
+void StatisticsLog::take(std::uint64_t monitor, const Sample& sample) {
+  if (monitor < monitors_.size()) monitors_[monitor].samples.push_back(sample);
 }
 
 void StatisticsLog::take(const v1::StatisticsRecord& record) {
@@ -70,9 +113,10 @@ void StatisticsLog::take(const v1::StatisticsRecord& record) {
     case v1::StatisticsRecord::kSchema:
       schema_ = record.schema();
       monitors_.resize(static_cast<std::size_t>(schema_.monitors_size()));
+      reserve();
       break;
     case v1::StatisticsRecord::kSample:
-      take(record.sample());
+      take(record.sample().monitor(), {record.sample().step(), record.sample().time(), record.sample().value()});
       break;
     case v1::StatisticsRecord::kBin:
       if (record.bin().monitor() < monitors_.size()) monitors_[record.bin().monitor()].closed[record.bin().bin()] = record.bin();
@@ -83,6 +127,15 @@ void StatisticsLog::take(const v1::StatisticsRecord& record) {
     case v1::StatisticsRecord::WHAT_NOT_SET:
       break;
   }
+}
+
+// Room for what is in the log already, if the series have it in even parts: growing by copies would cost as much as reading does.
+void StatisticsLog::reserve() {
+  constexpr std::size_t sample_bytes = 47;  // with its frame, at a million steps
+  std::error_code none;
+  const std::size_t bytes = std::filesystem::file_size(path_, none);
+  if (none || monitors_.empty()) return;
+  for (Monitor& monitor : monitors_) monitor.samples.reserve(bytes / sample_bytes / monitors_.size());
 }
 
 void StatisticsLog::forget_after(std::uint64_t step) {

@@ -45,7 +45,8 @@ class StatisticsLog {
     std::map<std::uint32_t, v1::BinClosed> closed;  // by bin
   };
   void take(const v1::StatisticsRecord& record);
-  void take(const v1::Sample& sample);
+  void take(std::uint64_t monitor, const Sample& sample);
+  void reserve();
   void forget_after(std::uint64_t step);
   v1::Series series_of(std::size_t monitor, const StatisticsQuery& query) const;
   v1::Profile profile_of(std::size_t monitor) const;

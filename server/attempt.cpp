@@ -39,6 +39,12 @@ void Attempt::take(const v1::Event& event) {
   if (event.has_stopped()) stopped_ = event.stopped();
 }
 
+std::int64_t Attempt::ended_unix_nanos() const {
+  v1::ExitRecord record;
+  if (read_message(folder_.exit_record(epoch_), record) && record.has_unix_nanos()) return record.unix_nanos();
+  return std::chrono::nanoseconds(std::chrono::system_clock::now().time_since_epoch()).count();
+}
+
 Ending Attempt::ending() const {
   if (stopped_) return {stopped_->reason(), stopped_->message()};
   const std::string log = last_lines(folder_.error_log(epoch_));

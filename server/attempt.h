@@ -38,6 +38,7 @@ class Attempt {
   // Since the engine's last sign of life, or since this began to look.
   std::chrono::steady_clock::duration silence() const { return std::chrono::steady_clock::now() - heard_; }
 
+  std::int64_t ended_unix_nanos() const;  // by the exit record; now if there is none
   // How it ended, once nothing of it lives: the engine's own word; else the exit record; else it was killed.
   Ending ending() const;
 

@@ -253,4 +253,34 @@ std::int64_t Catalogue::count(const std::vector<v1::JobState>& states, const std
   return row.number(0);
 }
 
+std::int64_t Catalogue::count_of(const std::string& owner) const {
+  Statement row(database_.get(), "SELECT count(*) FROM jobs WHERE ?1 = '' OR owner = ?1");
+  row.bind(owner).step();
+  return row.number(0);
+}
+
+std::map<v1::JobState, std::uint64_t> Catalogue::counts() const {
+  std::map<v1::JobState, std::uint64_t> counts;
+  Statement rows(database_.get(), "SELECT state, count(*) FROM jobs GROUP BY state");
+  while (rows.step()) counts[static_cast<v1::JobState>(rows.number(0))] = static_cast<std::uint64_t>(rows.number(1));
+  return counts;
+}
+
+void Catalogue::copy(const std::filesystem::path& from, const std::filesystem::path& to) {
+  const auto open = [](const std::filesystem::path& file, int flags) {
+    sqlite3* database = nullptr;
+    const int result = sqlite3_open_v2(file.c_str(), &database, flags, nullptr);
+    std::unique_ptr<sqlite3, Close> held(database);
+    if (result != SQLITE_OK) fail(database, "opening " + file.string());
+    run(database, "PRAGMA busy_timeout=10000");
+    return held;
+  };
+  const auto source = open(from, SQLITE_OPEN_READWRITE);  // a reader of a write-ahead log writes its index
+  const auto target = open(to, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE);
+  sqlite3_backup* backup = sqlite3_backup_init(target.get(), "main", source.get(), "main");
+  if (!backup) fail(target.get(), "copying to " + to.string());
+  sqlite3_backup_step(backup, -1);
+  if (sqlite3_backup_finish(backup) != SQLITE_OK) fail(target.get(), "copying to " + to.string());
+}
+
 }  // namespace bedflow::server

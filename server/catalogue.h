@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -47,6 +48,10 @@ class Catalogue {
   std::vector<JobRecord> page(std::int64_t below, const std::vector<v1::JobState>& states, std::int64_t most,
                               const std::string& owner = {}) const;
   std::int64_t count(const std::vector<v1::JobState>& states, const std::string& owner = {}) const;
+  std::int64_t count_of(const std::string& owner) const;  // all jobs if empty
+  std::map<v1::JobState, std::uint64_t> counts() const;
+  // All of it as it is now, into a new file: for a backup, while servers go on writing.
+  static void copy(const std::filesystem::path& from, const std::filesystem::path& to);
 
  private:
   struct Close {

@@ -159,6 +159,7 @@ v1::CreateJobResponse Jobs::commit(JobRecord& record, const v1::CreateJobRequest
   }
   const std::lock_guard guard(mutex_);
   if (auto earlier = earlier_answer(record.job.owner(), request, content)) return *earlier;  // a retry has overtaken us
+  require_quota(record.job.owner());
   if (const JobFolder* folder = draft ? &draft->folder : imported) move_into_place(*folder, folder_of(record.job.id()));
   catalogue_.insert(record, request_key(record.job.owner(), request.request_id()), content);
   spdlog::info("{} is {}: case {}, {} ranks, of {}", record.job.id(), state_word(record.job.state()),

@@ -43,6 +43,15 @@ std::vector<Number> numbers_in(const fs::path& folder, const std::function<std::
   return found;
 }
 
+std::vector<std::uint64_t> steps_in(const fs::path& folder) {
+  auto steps = numbers_in<std::uint64_t>(folder, [](const std::string& name) -> std::optional<std::uint64_t> {
+    if (name.size() < 24 || !name.starts_with("checkpoint_") || !name.ends_with(".h5")) return std::nullopt;
+    return whole_number<std::uint64_t>(std::string_view(name).substr(11, name.size() - 14));
+  });
+  std::reverse(steps.begin(), steps.end());
+  return steps;
+}
+
 }  // namespace
 
 DraftFolder::DraftFolder(std::filesystem::path path) : folder(std::move(path)) {
@@ -61,12 +70,11 @@ std::string JobFolder::checkpoint_name(std::uint64_t step) {
 }
 
 std::vector<std::uint64_t> JobFolder::checkpoint_steps() const {
-  auto steps = numbers_in<std::uint64_t>(checkpoints(), [](const std::string& name) -> std::optional<std::uint64_t> {
-    if (name.size() < 24 || !name.starts_with("checkpoint_") || !name.ends_with(".h5")) return std::nullopt;
-    return whole_number<std::uint64_t>(std::string_view(name).substr(11, name.size() - 14));
-  });
-  std::reverse(steps.begin(), steps.end());
-  return steps;
+  return steps_in(checkpoints());
+}
+
+std::vector<std::uint64_t> JobFolder::pinned_steps() const {
+  return steps_in(pinned());
 }
 
 std::vector<std::uint32_t> JobFolder::epochs() const {

@@ -29,6 +29,10 @@ class JobFolder {
   std::filesystem::path control() const { return root_ / "control.txtpb"; }
   std::filesystem::path checkpoints() const { return root_ / "checkpoints"; }
   std::filesystem::path checkpoint(std::uint64_t step) const { return checkpoints() / checkpoint_name(step); }
+  // Beside a checkpoint that stays when newer ones come.
+  std::filesystem::path kept_mark(std::uint64_t step) const { return checkpoints() / (checkpoint_name(step) + ".kept"); }
+  std::filesystem::path pinned() const { return root_ / "pinned"; }
+  std::filesystem::path pin(std::uint64_t step) const { return pinned() / checkpoint_name(step); }
   std::filesystem::path attempts() const { return root_ / "attempts"; }
   std::filesystem::path attempt(std::uint32_t epoch) const { return attempts() / std::to_string(epoch); }
   std::filesystem::path lock(std::uint32_t epoch) const { return attempt(epoch) / "lock"; }
@@ -38,6 +42,7 @@ class JobFolder {
 
   static std::string checkpoint_name(std::uint64_t step);
   std::vector<std::uint64_t> checkpoint_steps() const;  // newest first, by name; nothing is opened
+  std::vector<std::uint64_t> pinned_steps() const;      // the same of those that are pinned
   std::vector<std::uint32_t> epochs() const;            // attempts that have a folder, in order
 
   // Replaces control.txtpb by the command, with a sequence number above the last. Throws std::system_error.

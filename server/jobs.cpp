@@ -65,7 +65,12 @@ v1::Job Jobs::view(const JobRecord& record) const {
   v1::Job job = record.job;
   job.set_folder(folder_of(job.id()).root());
   job.set_retries(record.retries);
+  if (const auto why = waits_for_.find(job.id()); why != waits_for_.end() && is_waiting(job.state()))
+    job.set_waits_for(why->second);
   if (const auto live = live_.find(job.id()); live != live_.end()) {
+    add_time_so_far(job);
+    if (const auto memory = measured_.memory.find(job.id()); memory != measured_.memory.end())
+      job.set_memory_bytes(memory->second);
     const Attempt& attempt = live->second.attempt;
     if (attempt.progress().ByteSizeLong() > 0) *job.mutable_progress() = attempt.progress();
     job.set_last_sequence(attempt.last_sequence());
@@ -85,6 +90,9 @@ void Jobs::store(JobRecord& record, v1::JobState state, std::optional<Ending> wh
   JobRecord changed = record;
   changed.job = view(record);
   changed.job.clear_folder();
+  changed.job.clear_waits_for();
+  changed.job.clear_memory_bytes();
+  changed.job.set_rank_seconds(record.job.rank_seconds());  // without that of the attempt that runs
   if (state != v1::RECOVERING) changed.job.clear_next_attempt_unix_nanos();
   changed.job.set_state(state);
   changed.job.set_changed_unix_nanos(now_nanos());
@@ -96,6 +104,7 @@ void Jobs::store(JobRecord& record, v1::JobState state, std::optional<Ending> wh
   }
   catalogue_.update(changed);
   record = changed;
+  ++entered_[state];
   spdlog::info("{} is {}{}", record.job.id(), state_word(state), why ? ": " + why->message : "");
   if (const auto watched = feeds_.find(record.job.id()); watched != feeds_.end()) {
     if (const auto feed = watched->second.lock()) feed->add(view(record));
@@ -109,7 +118,7 @@ void Jobs::store(JobRecord& record, v1::JobState state, std::optional<Ending> wh
 
 v1::Job Jobs::get(const std::string& id) {
   const std::lock_guard guard(mutex_);
-  return view(record_of(id));
+  return with_pins(record_of(id));
 }
 
 v1::ListJobsResponse Jobs::list(const v1::ListJobsRequest& request) {

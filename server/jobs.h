@@ -21,6 +21,7 @@
 #include "folder.h"
 #include "follow.h"
 #include "planner.h"
+#include "quota.h"
 #include "states.h"
 
 namespace bedflow::server {
@@ -30,6 +31,27 @@ struct Settings {
   Programs programs;
   std::uint32_t slots = 4;  // ranks that may run at once
   std::chrono::seconds heartbeat_limit{30};
+  Quotas quotas;
+  std::uint64_t disk_reserve = 0;  // bytes; no job starts while less is free
+};
+
+// What the housekeeping has found: memory of running jobs, disk of owners and of all.
+struct MeasuredUse {
+  std::map<std::string, std::uint64_t> memory, owner_bytes;
+  std::uint64_t bytes = 0;
+};
+
+// The jobs as numbers. entered, failures: since this server began.
+struct Figures {
+  std::map<v1::JobState, std::uint64_t> jobs, entered;
+  std::map<v1::StopReason, std::uint64_t> failures;
+  std::uint32_t ranks_in_use = 0, slots = 0;
+  std::uint64_t disk_free = 0, disk_reserve = 0;  // bytes
+  std::vector<v1::Job> live;
+};
+
+struct RemovedCheckpoints {
+  std::uint64_t checkpoints = 0, bytes = 0;
 };
 
 // Equal messages give equal bytes: maps in order.
@@ -50,6 +72,7 @@ class Jobs {
   v1::Job suspend(const Caller& caller, const std::string& id);
   v1::Job resume(const Caller& caller, const v1::ResumeJobRequest& request);
   std::uint64_t remove(const Caller& caller, const std::string& id);  // the bytes that are free again
+  v1::Job set_pin(const Caller& caller, const v1::SetPinRequest& request);
   DraftFolder new_draft() const;
   // A suspended job of a draft with a case and a checkpoint. crc: of the file that was sent.
   v1::Job import(const Caller& caller, const v1::ImportCheckpointRequest::Head& head, const JobFolder& draft,
@@ -58,12 +81,19 @@ class Jobs {
   v1::ServerInfo info();
   JobFolder folder(const std::string& id);    // of a job that exists; it may not have been laid out yet
   v1::Case read_case(const std::string& id);  // the effective case
+  Figures figures();
+  std::vector<v1::Job> all();         // newest first
+  void add_limits(v1::Usage& usage);  // queue, quotas, reserve
   Cursor watch(const std::string& id, std::uint64_t after, bool from_now);
 
   // The supervising thread: waits for news (0.2 s at most), then takes every attempt and the queue one step on. Returns the jobs
   // that have something new for their watchers.
   std::set<std::string> advance();
   void poke() { notifier_.poke(); }
+  void take_measured(MeasuredUse measured);
+  // Of a job that is as it was seen, which no engine runs: those steps, and what resumes from earlier ones have left behind. Told
+  // in its events. Throws Refusal when it has changed.
+  RemovedCheckpoints remove_checkpoints(const v1::Job& seen, const std::vector<std::uint64_t>& steps);
   bool is_idle();       // nothing waits, nothing runs
   void stop_waiting();  // calls that wait for an engine are answered now: the server goes down
 
@@ -83,7 +113,10 @@ class Jobs {
   JobRecord record_of(const std::string& id) const;
   JobRecord own_record(const Caller& caller, const std::string& id) const;  // of a job that the caller may act on
   v1::Job view(const JobRecord& record) const;                              // with what the attempt has done since
+  v1::Job with_pins(const JobRecord& record) const;                         // view
+  void require_no_pin(const JobRecord& record) const;
   std::shared_ptr<Feed> feed_of(const v1::Job& job);
+  void tell(JobRecord record, const std::string& text);
   void store(JobRecord& record, v1::JobState state, std::optional<Ending> why = std::nullopt);
   JobRecord& require(JobRecord& record, Request request, const char* wanted) const;
   v1::Job request(const Caller& caller, const std::string& id, Request request, const char* wanted, v1::Control::Command command,
@@ -104,6 +137,12 @@ class Jobs {
   void end(Live& live);
   void store_end(JobRecord& record, Ending ending, bool is_nobodys_fault);
   std::optional<JobRecord> next_to_start();
+  std::uint64_t running(const std::string& owner) const;  // empty: of all
+  Holding holding(const std::string& owner) const;        // empty: of all
+  void require_quota(const std::string& owner) const;
+  std::string why_not_start(const v1::Job& job) const;
+  static void count_time(JobRecord& record, std::int64_t until);  // of the attempt that ended then
+  static void add_time_so_far(v1::Job& job);                      // of the attempt that runs
   void start(JobRecord record, std::unique_lock<std::mutex>& guard);
 
   Settings settings_;
@@ -116,6 +155,10 @@ class Jobs {
   std::map<std::string, Live> live_;
   std::map<std::string, std::weak_ptr<Feed>> feeds_;  // of jobs that are watched
   std::set<std::string> news_;
+  std::map<std::string, std::string> waits_for_;  // jobs that may not start, and why
+  std::map<v1::JobState, std::uint64_t> entered_;
+  std::map<v1::StopReason, std::uint64_t> failures_;
+  MeasuredUse measured_;
   bool stopping_ = false;
 };
 

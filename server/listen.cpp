@@ -51,7 +51,7 @@ std::vector<std::string> addresses(const Listening& listening, const std::filesy
 }
 
 std::unique_ptr<grpc::Server> listen(const Listening& listening, std::vector<std::string>& addresses, grpc::Service& service,
-                                     const Door& door, const Tokens& tokens) {
+                                     const Door& door, const Tokens& tokens, CallMeter& calls) {
   gpr_set_log_function(tell_what_grpc_says);
   grpc::EnableDefaultHealthCheckService(true);
   grpc::reflection::InitProtoReflectionServerBuilderPlugin();
@@ -65,7 +65,9 @@ std::unique_ptr<grpc::Server> listen(const Listening& listening, std::vector<std
     builder.AddListeningPort(addresses[i], is_plain ? grpc::InsecureServerCredentials() : tls, &ports[i]);
   }
   builder.RegisterService(&service);
-  if (auto takers = door.interceptors(); !takers.empty()) builder.experimental().SetInterceptorCreators(std::move(takers));
+  auto takers = door.interceptors();
+  takers.insert(takers.begin(), std::make_unique<CallMeterFactory>(calls));  // what the door turns away is counted too
+  builder.experimental().SetInterceptorCreators(std::move(takers));
   builder.SetMaxReceiveMessageSize(32 << 20);
   builder.SetResourceQuota(grpc::ResourceQuota("bedflowd").Resize(512 << 20));
   builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, 1000);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "door.h"
+#include "metrics.h"
 #include "tls.h"
 
 namespace bedflow::server {
@@ -26,6 +27,6 @@ std::vector<std::string> addresses(const Listening& listening, const std::filesy
 
 // Listens; a port 0 in the addresses becomes the one that it was given. Throws std::runtime_error.
 std::unique_ptr<grpc::Server> listen(const Listening& listening, std::vector<std::string>& addresses, grpc::Service& service,
-                                     const Door& door, const Tokens& tokens);
+                                     const Door& door, const Tokens& tokens, CallMeter& calls);
 
 }  // namespace bedflow::server

@@ -13,12 +13,17 @@
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <thread>
 
+#include "backup.h"
+#include "housekeeping.h"
 #include "jobs.h"
 #include "listen.h"
+#include "log_format.h"
+#include "operating_options.h"
 #include "runner.h"
 #include "security.h"
 #include "service.h"
@@ -35,6 +40,7 @@ using namespace std::chrono_literals;
 struct Options {
   Settings settings;
   Listening listening;
+  OperatingOptions operating;
   bool idle_exit = false;
   double idle_seconds = 10;
   double bookmark_seconds = 10;
@@ -75,7 +81,17 @@ void wait_for_end(const sigset_t& signals, const std::function<bool()>& has_noth
   }
 }
 
-[[noreturn]] void serve(const Options& options) {
+std::set<std::string> jobs_of(Studies& studies) {
+  std::set<std::string> jobs;
+  const auto list = studies.list();
+  for (const auto& study : list.studies()) {
+    if (study.has_packing_job()) jobs.insert(study.packing_job());
+    for (const auto& run : study.runs()) jobs.insert(run.job());
+  }
+  return jobs;
+}
+
+[[noreturn]] void serve(Options& options) {
   sigset_t signals;
   sigemptyset(&signals);
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&signals, signal);
@@ -93,12 +109,15 @@ void wait_for_end(const sigset_t& signals, const std::function<bool()>& has_noth
   auto listened = addresses(options.listening, data);
   Tokens tokens(data / "tokens.txtpb");
   const Door door(tokens, options.listening.has_network());
+  const auto operating = operating_settings(options.operating, options.settings);
   Jobs jobs(options.settings);
   Studies studies(jobs, data / "studies");
   Watchers watchers(std::chrono::milliseconds(static_cast<int>(1000 * options.bookmark_seconds)));
   Readers readers(options.reader);
-  JobService service(jobs, studies, watchers, readers, options.settings.programs.engine, door, tokens);
-  const auto server = listen(options.listening, listened, service, door, tokens);
+  Housekeeping housekeeping(jobs, readers, operating);
+  JobService service(jobs, studies, watchers, readers, housekeeping, options.settings.programs.engine, door, tokens);
+  const auto server = listen(options.listening, listened, service, door, tokens, housekeeping.calls());
+  housekeeping.start([&] { return std::pair(watchers.count(), service.calls()); }, [&] { return jobs_of(studies); });
   std::string all;
   for (const auto& address : listened) {
     all += (all.empty() ? "" : ", ") + address;
@@ -142,6 +161,7 @@ void wait_for_end(const sigset_t& signals, const std::function<bool()>& has_noth
   jobs.poke();
   supervisor.join();
   study_supervisor.join();
+  housekeeping.stop();
   service.wait_for_calls();
   // gRPC's own end may wait 10 s for a poller of a connection that is gone. All that lasts is on the disk.
   spdlog::shutdown();
@@ -189,6 +209,25 @@ void add_server_options(CLI::App& app, Options& options) {
       ->check(CLI::Range(1.0, 3600.0));
 }
 
+struct BackupOptions {
+  fs::path data, to;
+};
+
+CLI::App* add_backup(CLI::App& app, BackupOptions& options) {
+  auto* command = app.add_subcommand("backup", "copy a data folder so that a server can go on from the copy; the server may run");
+  command->add_option("--data", options.data, "the data folder")->required();
+  command->add_option("--to", options.to, "folder of the copy: new, or an earlier one that is brought up to date")->required();
+  return command;
+}
+
+int copy_data(const BackupOptions& options) {
+  const auto report = back_up(options.data, options.to);
+  std::printf("%llu jobs; %llu files that were new or had changed, %s, copied to %s\n",
+              static_cast<unsigned long long>(report.jobs), static_cast<unsigned long long>(report.files),
+              text_of_bytes(report.bytes).c_str(), options.to.c_str());
+  return 0;
+}
+
 CLI::App* add_runner(CLI::App& app, RunnerOptions& runner) {
   auto* command = app.add_subcommand("run-attempt", "run one attempt of a job, without a server")->group("");
   command->add_option("folder", runner.folder)->required();
@@ -206,7 +245,10 @@ int run(int argc, char** argv) {
   app.set_version_flag("--version", BEDFLOW_VERSION);
   Options options;
   RunnerOptions runner;
+  BackupOptions backup;
   add_server_options(app, options);
+  add_operating_options(app, options.operating);
+  const auto* backing_up = add_backup(app, backup);
   const auto* attempt = add_runner(app, runner);
   try {
     app.parse(argc, argv);
@@ -214,6 +256,8 @@ int run(int argc, char** argv) {
     return app.exit(error) == 0 ? 0 : 2;
   }
   if (attempt->parsed()) return run_attempt(runner);
+  if (backing_up->parsed()) return copy_data(backup);
+  set_up_log(options.operating.log);
   if (options.settings.data.empty())
     throw std::invalid_argument("--data is missing: the folder of the jobs, e.g. --data ./bedflow-data");
   options.settings.data = fs::absolute(options.settings.data).lexically_normal();

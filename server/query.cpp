@@ -42,6 +42,8 @@ v1::ListCheckpointsResponse list_checkpoints(const JobFolder& folder, const std:
     checkpoint.set_step(step);
     checkpoint.set_bytes(bytes);
     checkpoint.set_file(JobFolder::checkpoint_name(step));
+    if (std::filesystem::exists(folder.pin(step), gone)) checkpoint.set_pinned(true);
+    if (std::filesystem::exists(folder.kept_mark(step), gone)) checkpoint.set_stays(true);
     if (const auto time = times.find(step); time != times.end()) checkpoint.set_time(time->second);
   }
   return response;

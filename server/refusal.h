@@ -18,6 +18,7 @@ enum class Refused {
   study_not_found,       //
   series_not_found,      //
   wrong_state,           // the job's state does not allow it
+  quota,                 // of the owner, or of all
   request_id_reused,     // the same id with another content
   not_owner,             // the job is another's, and the caller no admin
   scope_too_small,       // the caller's token does not go so far

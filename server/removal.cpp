@@ -33,6 +33,7 @@ std::uint64_t Jobs::remove(const Caller& caller, const std::string& id) {
       throw Refusal(Refused::wrong_state, "job " + id + " is " + state_word(state) + " and cannot be deleted before it has ended",
                     "bedflow cancel " + id);
     }
+    require_no_pin(record);
     if (fs::exists(folder_of(id).root())) {  // one that was cancelled before it began has none
       fs::create_directories(removed.parent_path());
       fs::rename(folder_of(id).root(), removed);
@@ -41,6 +42,7 @@ std::uint64_t Jobs::remove(const Caller& caller, const std::string& id) {
     }
     catalogue_.erase(id);
     feeds_.erase(id);
+    waits_for_.erase(id);
   }
   const std::uint64_t freed = bytes_freed(removed);
   fs::remove_all(removed);

@@ -59,6 +59,8 @@ Code code_of(Refused why) {
       return {grpc::StatusCode::RESOURCE_EXHAUSTED, "TOO_MUCH"};
     case Refused::log_damaged:
       return {grpc::StatusCode::DATA_LOSS, "LOG_DAMAGED"};
+    case Refused::quota:
+      return {grpc::StatusCode::RESOURCE_EXHAUSTED, "QUOTA"};
     case Refused::disk_full:
       return {grpc::StatusCode::RESOURCE_EXHAUSTED, "DISK_FULL"};
     case Refused::going_down:
@@ -232,6 +234,14 @@ JobService::Unary* JobService::GetServerInfo(Context* context, const v1::GetServ
     response->set_caller(caller.owner);
     response->set_caller_scope(caller.scope);
   });
+}
+
+JobService::Unary* JobService::SetPin(Context* context, const v1::SetPinRequest* request, v1::Job* response) {
+  return answer(context, Pace::quick, [=, this](const Caller& caller) { *response = jobs_.set_pin(caller, *request); });
+}
+
+JobService::Unary* JobService::GetUsage(Context* context, const v1::GetUsageRequest* request, v1::Usage* response) {
+  return answer(context, Pace::slow, [=, this](const Caller&) { *response = housekeeping_.usage(*request); });
 }
 
 }  // namespace bedflow::server

@@ -13,6 +13,7 @@
 
 #include "bedflow/v1/service.grpc.pb.h"
 #include "door.h"
+#include "housekeeping.h"
 #include "jobs.h"
 #include "reader.h"
 #include "refusal.h"
@@ -29,12 +30,13 @@ grpc::Status status_of_failure(const std::exception& failure);  // of a Refusal 
 
 class JobService final : public v1::JobService::CallbackService {
  public:
-  JobService(Jobs& jobs, Studies& studies, Watchers& watchers, Readers& readers, std::filesystem::path engine, const Door& door,
-             Tokens& tokens)
+  JobService(Jobs& jobs, Studies& studies, Watchers& watchers, Readers& readers, Housekeeping& housekeeping,
+             std::filesystem::path engine, const Door& door, Tokens& tokens)
       : jobs_(jobs),
         studies_(studies),
         watchers_(watchers),
         readers_(readers),
+        housekeeping_(housekeeping),
         engine_(std::move(engine)),
         door_(door),
         tokens_(tokens) {}
@@ -85,11 +87,14 @@ class JobService final : public v1::JobService::CallbackService {
   Unary* CreateToken(Context*, const v1::CreateTokenRequest*, v1::Token*) override;
   Unary* ListTokens(Context*, const v1::ListTokensRequest*, v1::ListTokensResponse*) override;
   Unary* RevokeToken(Context*, const v1::RevokeTokenRequest*, v1::RevokeTokenResponse*) override;
+  Unary* SetPin(Context*, const v1::SetPinRequest*, v1::Job*) override;
+  Unary* GetUsage(Context*, const v1::GetUsageRequest*, v1::Usage*) override;
 
   Jobs& jobs_;
   Studies& studies_;
   Watchers& watchers_;
   Readers& readers_;
+  Housekeeping& housekeeping_;
   StatisticsLogs statistics_;
   const std::filesystem::path engine_;
   const Door& door_;

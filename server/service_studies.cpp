@@ -21,8 +21,9 @@ JobService::Unary* JobService::CancelStudy(Context* context, const v1::CancelStu
 
 JobService::Unary* JobService::DeleteStudy(Context* context, const v1::DeleteStudyRequest* request,
                                            v1::DeleteStudyResponse* response) {
-  return answer(context, Pace::slow,
-                [=, this](const Caller& caller) { response->set_freed_bytes(studies_.remove(caller, request->id(), request->with_jobs())); });
+  return answer(context, Pace::slow, [=, this](const Caller& caller) {
+    response->set_freed_bytes(studies_.remove(caller, request->id(), request->with_jobs()));
+  });
 }
 
 }  // namespace bedflow::server

@@ -86,7 +86,8 @@ Studies::Studies(Jobs& jobs, std::filesystem::path folder) : jobs_(jobs), folder
 
 Studies::Kept& Studies::kept(const std::string& id) {
   if (!is_study_id(id))
-    throw Refusal(Refused::bad_request, "'" + printable(id) + "' is not a study's id (s- and 12 hex digits)", "bedflow study list");
+    throw Refusal(Refused::bad_request, "'" + printable(id) + "' is not a study's id (s- and 12 hex digits)",
+                  "bedflow study list");
   const auto found = studies_.find(id);
   if (found == studies_.end()) throw Refusal(Refused::study_not_found, "there is no study " + id, "bedflow study list");
   return found->second;
@@ -111,7 +112,8 @@ std::optional<v1::Study> Studies::earlier_answer(const Caller& caller, const v1:
   for (const auto& [id, kept] : studies_) {
     if (kept.study.request_id() != request.request_id() || kept.study.owner() != caller.owner) continue;
     if (content_of(kept.study.spec()) == content_of(request.spec())) return kept.study;
-    throw Refusal(Refused::request_id_reused, "request id " + request.request_id() + " has been used for " + id + ", another study",
+    throw Refusal(Refused::request_id_reused,
+                  "request id " + request.request_id() + " has been used for " + id + ", another study",
                   "bedflow study get " + id);
   }
   return std::nullopt;
@@ -131,7 +133,8 @@ v1::Study Studies::create(const Caller& caller, const v1::CreateStudyRequest& re
   check_points(spec, faults);
   check_stop(spec, faults);
   if (!faults.empty())
-    throw Refusal(Refused::bad_request, "the study has " + std::to_string(faults.size()) + " faults", "bedflow study --help", faults);
+    throw Refusal(Refused::bad_request, "the study has " + std::to_string(faults.size()) + " faults", "bedflow study --help",
+                  faults);
   for (int i = 0; i < spec.points_size(); ++i) {  // every check that a job of its own would get
     v1::CreateJobRequest probe;
     *probe.mutable_case_() = spec.points(i).case_();
@@ -142,7 +145,8 @@ v1::Study Studies::create(const Caller& caller, const v1::CreateStudyRequest& re
     } catch (const Refusal& refusal) {
       std::string values;
       for (const auto& value : spec.points(i).values()) values += (values.empty() ? "" : ", ") + printable(value);
-      throw Refusal(refusal.why, "point " + std::to_string(i) + " (" + values + "): " + refusal.what(), refusal.next, refusal.faults);
+      throw Refusal(refusal.why, "point " + std::to_string(i) + " (" + values + "): " + refusal.what(), refusal.next,
+                    refusal.faults);
     }
   }
   Kept kept;
@@ -180,8 +184,8 @@ v1::Study Studies::get(const std::string& id) {
     if (results[i].cost) *run.mutable_cost() = *results[i].cost;
     for (std::size_t q = 0; q < results[i].quantities.size(); ++q) {
       *run.add_quantities() = overall(results[i].quantities[q]);
-      *run.add_errors() = q < reference.quantities.size() ? difference(results[i].quantities[q], reference.quantities[q])
-                                                          : v1::StudyError();
+      *run.add_errors() =
+          q < reference.quantities.size() ? difference(results[i].quantities[q], reference.quantities[q]) : v1::StudyError();
     }
   }
   mark_front(study);
@@ -232,8 +236,9 @@ std::uint64_t Studies::remove(const Caller& caller, const std::string& id, bool 
   }
   const auto is_of_another = [&](const std::string& job) {
     return std::ranges::any_of(studies_, [&](const auto& other) {
-      return other.first != id && (other.second.study.packing_job() == job ||
-                                   std::ranges::any_of(other.second.study.runs(), [&](const auto& run) { return run.job() == job; }));
+      return other.first != id &&
+             (other.second.study.packing_job() == job ||
+              std::ranges::any_of(other.second.study.runs(), [&](const auto& run) { return run.job() == job; }));
     });
   };
   std::vector<std::string> jobs;

@@ -96,10 +96,10 @@ void mark_front(v1::Study& study) {
     for (auto& run : *study.mutable_runs()) {
       const auto mine = worth_of(run, quantity);
       const bool beaten = mine && std::ranges::any_of(study.runs(), [&](const v1::StudyRun& other) {
-        const auto theirs = worth_of(other, quantity);
-        return theirs && theirs->cost <= mine->cost && theirs->error <= mine->error &&
-               (theirs->cost < mine->cost || theirs->error < mine->error);
-      });
+                            const auto theirs = worth_of(other, quantity);
+                            return theirs && theirs->cost <= mine->cost && theirs->error <= mine->error &&
+                                   (theirs->cost < mine->cost || theirs->error < mine->error);
+                          });
       run.add_on_front(mine && !beaten);
     }
   }

@@ -59,7 +59,8 @@ void Studies::advance() {
     try {
       advance(found->second);
     } catch (const Refusal& refusal) {  // no job can be made of it any more: a quota, a disk, a case that this version refuses
-      if (refusal.why != Refused::disk_full && refusal.why != Refused::too_much) found->second.study.set_state(v1::STUDY_CANCELLED);
+      if (refusal.why != Refused::disk_full && refusal.why != Refused::too_much)
+        found->second.study.set_state(v1::STUDY_CANCELLED);
       found->second.study.set_message(refusal.what());
     }
     if (found->second.study.SerializeAsString() != before) store(found->second);
@@ -147,8 +148,8 @@ std::optional<std::string> Studies::done_before(const v1::Case& value, std::uint
   do {
     const auto page = jobs_.list(request);
     for (const auto& job : page.jobs()) {
-      const bool may_be = job.case_name() == value.name() && job.spec().ranks() == ranks &&
-                          job.start_from_job() == packing_job && job.packing_only() == !packing_job.empty();
+      const bool may_be = job.case_name() == value.name() && job.spec().ranks() == ranks && job.start_from_job() == packing_job &&
+                          job.packing_only() == !packing_job.empty();
       if (may_be && content_of(jobs_.read_case(job.id())) == wanted) return job.id();
     }
     request.set_page_token(page.next_page_token());

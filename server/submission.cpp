@@ -47,6 +47,9 @@ std::vector<v1::Fault> check_spec(const v1::JobSpec& spec, std::uint32_t slots) 
   faults.number("spec.checkpoints.every_wall_seconds", policy.has_every_wall_seconds(), policy.every_wall_seconds(), 0.1, 1e9,
                 "s");
   faults.number("spec.checkpoints.keep", policy.has_keep(), policy.keep(), 2, 1e6, "files");
+  faults.number("spec.checkpoints.keep_every_nth", policy.has_keep_every_nth(), policy.keep_every_nth(), 0, 1e6, "checkpoints");
+  faults.number("spec.checkpoints.keep_every_simulated_seconds", policy.has_keep_every_simulated_seconds(),
+                policy.keep_every_simulated_seconds(), 1e-12, 1e9, "s");
   if (spec.labels_size() > 64)
     faults.add("spec.labels", "are " + std::to_string(spec.labels_size()) + "; at most 64 are allowed");
   for (const auto& [key, value] : spec.labels()) {

@@ -120,6 +120,8 @@ void Jobs::end(Live& live) {
   const bool never_began = live.adopted && !std::filesystem::exists(folder.runner(attempt.epoch()));
   if (attempt.has_started()) changed.from_step.reset();  // the checkpoint was good; from now on the newest is
   if (attempt.has_gone_on()) changed.retries = 0;        // a week has many faults; each brings the job further
+  count_time(changed, attempt.ended_unix_nanos());
+  if (ending.reason >= v1::INVALID_CASE) ++failures_[ending.reason];
   store_end(changed, ending, never_began);
   live.record = changed;
   notifier_.remove(folder.events());
@@ -142,6 +144,10 @@ std::optional<JobRecord> Jobs::next_to_start() {
   for (const auto& [id, live] : live_) used += live.record.job.spec().ranks();
   for (auto& record : catalogue_.in_states({v1::PENDING, v1::RECOVERING}, queue_look)) {
     if (!is_due(record.job)) continue;
+    if (auto why = why_not_start(record.job); !why.empty()) {
+      waits_for_[record.job.id()] = std::move(why);
+      continue;
+    }
     if (used + record.job.spec().ranks() > settings_.slots) return std::nullopt;
     return std::move(record);
   }
@@ -152,8 +158,11 @@ std::optional<JobRecord> Jobs::next_to_start() {
 void Jobs::start(JobRecord record, std::unique_lock<std::mutex>& guard) {
   const std::string id = record.job.id();
   const auto folder = folder_of(id);
-  const auto epoch = record.job.epoch() + 1;
+  const auto epochs = folder.epochs();  // a folder restored from a backup may be ahead of the catalogue
+  const auto epoch = std::max(record.job.epoch(), epochs.empty() ? 0 : epochs.back()) + 1;
   record.job.set_epoch(epoch);
+  record.job.set_attempt_unix_nanos(now_nanos());
+  waits_for_.erase(id);
   // Committed before it happens: whatever dies now, no other attempt has this epoch.
   store(record, v1::STARTING);
   auto& live = live_.emplace(id, Live{std::move(record), Attempt(folder, epoch)}).first->second;  // only this thread erases it

@@ -58,15 +58,23 @@ struct CheckpointInfo {
   std::uint64_t step = 0;
   double time = 0;  // s
   std::uint64_t bytes = 0;
+  std::vector<std::uint64_t> removed = {};  // steps of those that were removed for it; on rank 0
+};
+
+// How many of the newest stay (at least 2), and whether the one that is written stays when newer ones come.
+struct KeepCheckpoints {
+  KeepCheckpoints(int newest_ones, bool this_one_too = false) : newest(newest_ones), this_one(this_one_too) {}
+  int newest;
+  bool this_one;
 };
 
 // Collective. Writes folder/checkpoint_<step, 10 digits>.h5 by way of ….partial (file_names.h, seal.h, layout.h): layout by rank
 // 0, posix_fallocate, each rank its slabs by pwrite, fsync, manifest, fsync, verify, rename, fsync of the folder; then removes
-// the oldest beyond `keep` (at least 2), and those of later steps, which a resume from an earlier one has made void. Throws Stop
-// on every rank alike: disk_full when there is no room (older checkpoints stay), stale_epoch when the folder's newest attempt is
-// above epoch (epoch 0: not checked), internal for other failures of the file system.
-CheckpointInfo write_checkpoint(const Comm& comm, const std::filesystem::path& folder, const CheckpointContent& content, int keep,
-                                std::uint32_t epoch = 0);
+// what is not to be kept, but for what is pinned, and those of later steps, which a resume from an earlier one has made void.
+// Throws Stop on every rank alike: disk_full when there is no room (older checkpoints stay), stale_epoch when the folder's newest
+// attempt is above epoch (epoch 0: not checked), internal for other failures of the file system.
+CheckpointInfo write_checkpoint(const Comm& comm, const std::filesystem::path& folder, const CheckpointContent& content,
+                                KeepCheckpoints keep, std::uint32_t epoch = 0);
 
 // Checks every block of a file against its manifest. Empty: good. Else names dataset and block, one line each.
 std::vector<std::string> verify_checkpoint(const std::filesystem::path& path);

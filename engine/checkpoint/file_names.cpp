@@ -29,6 +29,9 @@ std::string stem(std::uint64_t step) {
 std::string checkpoint_name(std::uint64_t step) {
   return stem(step) + ".h5";
 }
+std::string kept_name(std::uint64_t step) {
+  return checkpoint_name(step) + ".kept";
+}
 std::string partial_name(std::uint64_t step, std::uint32_t epoch) {
   return stem(step) + ".epoch" + std::to_string(epoch) + ".partial";
 }

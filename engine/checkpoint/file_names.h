@@ -10,6 +10,7 @@
 namespace bedflow {
 
 std::string checkpoint_name(std::uint64_t step);
+std::string kept_name(std::uint64_t step);  // of the mark beside a checkpoint that stays when newer ones come
 std::string partial_name(std::uint64_t step, std::uint32_t epoch);
 // Nothing for a file with another kind of name.
 std::optional<std::uint64_t> step_of_checkpoint(const std::filesystem::path& path);

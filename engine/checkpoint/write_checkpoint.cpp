@@ -78,30 +78,47 @@ void check_epoch(const fs::path& folder, std::uint32_t epoch) {
   }
 }
 
-// Beyond the newest up to this step, what is too many; those of later steps, which a resume from an earlier one has made void;
-// and what this attempt or one before it left unfinished. Not being able to remove is no failure.
-void prune(const fs::path& folder, std::uint64_t step, int keep, std::uint32_t epoch) {
+// Removes, beyond the newest up to this step, what neither the policy nor a pin keeps; those of later steps, which a resume from
+// an earlier one has made void; and what this attempt or one before it left unfinished. Not being able to remove is no failure.
+std::vector<std::uint64_t> prune(const fs::path& folder, std::uint64_t step, int newest, std::uint32_t epoch) {
   std::error_code ignored;
+  std::vector<std::uint64_t> removed;
   int kept = 0;
-  for (const CheckpointInfo& info : list_checkpoints(folder))
-    if (info.step > step || ++kept > std::max(keep, 2)) fs::remove(info.path, ignored);
+  for (const CheckpointInfo& info : list_checkpoints(folder)) {
+    const fs::path mark = folder / kept_name(info.step), pin = folder.parent_path() / "pinned" / info.path.filename();
+    const bool is_void = info.step > step;
+    if (!is_void && ++kept <= std::max(newest, 2)) continue;
+    if (!is_void && (fs::exists(mark, ignored) || fs::exists(pin, ignored))) continue;
+    if (fs::remove(info.path, ignored)) removed.push_back(info.step);
+    if (is_void) fs::remove(mark, ignored);
+  }
   std::vector<fs::path> torn;
   for (const auto& entry : fs::directory_iterator(folder, ignored)) {
     const std::optional<std::uint32_t> attempt = attempt_of_partial(entry.path());
     if (attempt && *attempt <= epoch) torn.push_back(entry.path());
   }
   for (const fs::path& path : torn) fs::remove(path, ignored);
+  return removed;
+}
+
+// Not being able to leave it is no failure: the checkpoint then goes with the others.
+void mark_as_kept(const fs::path& mark) {
+  try {
+    const PosixFile file(mark, PosixFile::Mode::create);
+  } catch (const std::exception&) {
+  }
 }
 
 }  // namespace
 
-CheckpointInfo write_checkpoint(const Comm& comm, const fs::path& folder_given, const CheckpointContent& content, int keep,
-                                std::uint32_t epoch) {
+CheckpointInfo write_checkpoint(const Comm& comm, const fs::path& folder_given, const CheckpointContent& content,
+                                KeepCheckpoints keep, std::uint32_t epoch) {
   fs::path folder = fs::absolute(folder_given).lexically_normal();
   if (!folder.has_filename()) folder = folder.parent_path();
   const fs::path target = folder / checkpoint_name(content.step), partial = folder / partial_name(content.step, epoch);
   const Layout layout(comm, content);
   Seal seal{content.step, content.time};
+  std::vector<std::uint64_t> removed;
   try {
     Manifest manifest;
     std::string text;
@@ -128,15 +145,16 @@ CheckpointInfo write_checkpoint(const Comm& comm, const fs::path& folder_given, 
     do_alike(comm, [&] {
       if (!comm.root()) return;
       check_epoch(folder, epoch);
+      if (keep.this_one) mark_as_kept(folder / kept_name(content.step));
       rename_for_good(partial, target);
-      prune(folder, content.step, keep, epoch);
+      removed = prune(folder, content.step, keep.newest, epoch);
     });
   } catch (const Stop&) {
     std::error_code ignored;
     if (comm.root()) fs::remove(partial, ignored);
     throw;
   }
-  CheckpointInfo info{target, content.step, content.time, seal.file_bytes};
+  CheckpointInfo info{target, content.step, content.time, seal.file_bytes, std::move(removed)};
   comm.broadcast(std::as_writable_bytes(std::span(&info.bytes, 1)));
   return info;
 }

@@ -66,8 +66,20 @@ RunPolicy read_policy(const std::filesystem::path& folder) {
           .checkpoint_simulated = checkpoints.every_simulated_seconds(),
           .checkpoint_wall = checkpoints.every_wall_seconds(),
           .keep = static_cast<int>(std::max(2u, checkpoints.keep())),
+          .keep_every_nth = checkpoints.keep_every_nth(),
+          .keep_every_simulated = checkpoints.keep_every_simulated_seconds(),
           .go_on_when_full = checkpoints.when_disk_full() == v1::CheckpointPolicy::GO_ON,
           .wall_limit = spec.wall_limit_seconds()};
+}
+
+std::uint64_t checkpoints_since_kept(const std::filesystem::path& folder) {
+  std::uint64_t count = 0;
+  LogReader(folder / "events.log").read([&](const LogRecord& record) {
+    v1::Event event;
+    if (!event.ParseFromString(record.payload) || !event.has_checkpoint()) return;
+    count = event.checkpoint().stays() ? 0 : count + 1;
+  });
+  return count;
 }
 
 // The two logs, and what waits for room on the disk: in order, events without their numbers yet.
@@ -186,14 +198,16 @@ void JobFolder::progress(const ProgressReport& now) {
   append_event(std::move(event));
 }
 
-void JobFolder::checkpoint(const std::string& file, std::uint64_t step, double time, std::uint64_t bytes, double seconds) {
+void JobFolder::checkpoint(const CheckpointWrittenReport& report) {
   v1::Event event;
   v1::CheckpointWritten& written = *event.mutable_checkpoint();
-  written.set_file(file);
-  written.set_step(step);
-  written.set_time(time);
-  written.set_bytes(bytes);
-  written.set_seconds(seconds);
+  written.set_file(report.file);
+  written.set_step(report.step);
+  written.set_time(report.time);
+  written.set_bytes(report.bytes);
+  written.set_seconds(report.seconds);
+  if (report.stays) written.set_stays(true);
+  written.mutable_removed_steps()->Assign(report.removed.begin(), report.removed.end());
   append_event(std::move(event));
   sync();
 }

@@ -26,11 +26,16 @@ struct RunPolicy {
   double checkpoint_simulated = 0;  // s
   double checkpoint_wall = 600;     // s
   int keep = 2;
-  bool go_on_when_full = false;  // a full disk stops the run otherwise
-  double wall_limit = 0;         // s
+  std::uint64_t keep_every_nth = 0;
+  double keep_every_simulated = 0;  // s
+  bool go_on_when_full = false;     // a full disk stops the run otherwise
+  double wall_limit = 0;            // s
 };
 // From job.txtpb; the defaults of the schema if there is none. Throws Stop(invalid_case) naming line and column.
 RunPolicy read_policy(const std::filesystem::path& folder);
+
+// How many checkpoints the folder's events tell of since the last that stays.
+std::uint64_t checkpoints_since_kept(const std::filesystem::path& folder);
 
 enum class Command { none, checkpoint, suspend, cancel, cancel_now };  // cancel_now: without a checkpoint
 
@@ -41,6 +46,16 @@ struct ProgressReport {
   std::uint64_t substeps = 0, particles = 0;
   int gas_iterations = 0;
   const char* phase = "running";
+};
+
+struct CheckpointWrittenReport {
+  std::string file;
+  std::uint64_t step = 0;
+  double time = 0;  // s
+  std::uint64_t bytes = 0;
+  double seconds = 0;  // that it took
+  bool stays = false;
+  std::vector<std::uint64_t> removed;  // steps of others
 };
 
 struct MonitorReport {
@@ -63,7 +78,7 @@ class JobFolder {
   void started(int ranks, std::uint64_t step, double time, double end_time, const std::string& from_checkpoint,
                const std::string& plan);
   void progress(const ProgressReport& now);
-  void checkpoint(const std::string& file, std::uint64_t step, double time, std::uint64_t bytes, double seconds);
+  void checkpoint(const CheckpointWrittenReport& report);
   void info(const std::string& text);
   void warning(const std::string& text);
   void error(const std::string& text);

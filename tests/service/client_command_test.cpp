@@ -3,7 +3,10 @@
 #include <google/protobuf/util/json_util.h>
 
 #include "client_fixture.h"
+#include "command_line.h"
 #include "failure.h"
+
+#include <set>
 
 namespace bedflow::client {
 namespace {
@@ -93,6 +96,33 @@ TEST_F(Client, ListComesAsTableJsonLinesAndCsv) {
   v1::ListJobsResponse all;
   ASSERT_TRUE(google::protobuf::util::JsonStringToMessage("{\"jobs\":" + bedflow({"list", "-o", "json"}).out + "}", &all).ok());
   EXPECT_EQ(all.jobs(1).reason(), v1::DIVERGED);
+}
+
+// Verbs that print data take -o; what the others print is one text, or nothing.
+void find_verbs_without_format(const std::string& name, CLI::App& app, std::vector<std::string>& found, std::size_t& verbs) {
+  const auto below = app.get_subcommands({});
+  for (auto* verb : below) find_verbs_without_format(name + (name.empty() ? "" : " ") + verb->get_name(), *verb, found, verbs);
+  if (!below.empty()) return;
+  ++verbs;
+  const auto* option = app.get_option_no_throw("--output");
+  if (!option || option->get_description() != "table, json, jsonl or csv") found.push_back(name);
+}
+
+TEST_F(Client, EveryVerbThatPrintsDataTakesTableJsonLinesAndCsv) {
+  Program program;
+  const auto app = command_line(program);
+  std::vector<std::string> found;
+  std::size_t verbs = 0;
+  find_verbs_without_format("", *app, found, verbs);
+  const std::set<std::string> others = {"completion",  // a script for a shell
+                                        "__complete",  // its question
+                                        "plot",        // -o names the file
+                                        "render",       "checkpoint download",
+                                        "study cancel",  // say on stderr that it is done
+                                        "study delete", "server token revoke", "context add", "context use", "context remove"};
+  EXPECT_GT(verbs, 30U);
+  for (const auto& name : found) EXPECT_TRUE(others.contains(name)) << "bedflow " << name << " has no -o";
+  for (const auto& name : others) EXPECT_THAT(found, testing::Contains(name));
 }
 
 TEST_F(Client, ValidateListsEveryFaultWithItsPathAndExitsTwo) {

@@ -167,15 +167,7 @@ class FullDisk : private DiskHolder, public testing::Test {
   }
   std::set<std::string> listed() {
     std::set<std::string> ids;
-    v1::ListJobsRequest list;
-    list.set_page_size(1000);
-    do {
-      grpc::ClientContext context;
-      v1::ListJobsResponse page;
-      EXPECT_TRUE(server_.stub().ListJobs(&context, list, &page).ok());
-      for (const auto& job : page.jobs()) ids.insert(job.id());
-      list.set_page_token(page.next_page_token());
-    } while (!list.page_token().empty());
+    for (const auto& job : all_jobs(server_.stub())) ids.insert(job.id());
     return ids;
   }
   using DiskHolder::disk;

@@ -21,18 +21,6 @@ class Durability : public ServiceTest {
  protected:
   explicit Durability(std::vector<std::string> arguments = {}) : ServiceTest(std::move(arguments)) {}
 
-  std::vector<v1::Job> all_jobs() {
-    std::vector<v1::Job> jobs;
-    v1::ListJobsRequest request;
-    request.set_page_size(1000);
-    do {
-      v1::ListJobsResponse page;
-      EXPECT_TRUE(call(&v1::JobService::Stub::ListJobs, request, page).ok());
-      jobs.insert(jobs.end(), page.jobs().begin(), page.jobs().end());
-      request.set_page_token(page.next_page_token());
-    } while (!request.page_token().empty());
-    return jobs;
-  }
   bool was_doubled(const std::string& id) const { return std::filesystem::exists(server_.folder(id) / "doubled"); }
 
   // `bedflowd run-attempt`, as by hand.
@@ -100,10 +88,10 @@ TEST_F(Durability, EveryAcknowledgedJobIsThereOnceAndRunsOnceWhereverTheServerIs
   EXPECT_EQ(acknowledged.size(), loop.acknowledged().size()) << "two requests got the same job";
   const auto is_done = [](const v1::Job& job) { return job.state() == v1::SUCCEEDED; };
   ASSERT_TRUE(holds_within(120s, [&] {
-    const auto jobs = all_jobs();
+    const auto jobs = all_jobs(stub());
     return std::all_of(jobs.begin(), jobs.end(), is_done);
   }));
-  const auto jobs = all_jobs();
+  const auto jobs = all_jobs(stub());
   EXPECT_EQ(jobs.size(), acknowledged.size());
   for (const auto& job : jobs) {
     EXPECT_EQ(acknowledged.count(job.id()), 1u) << job.id() << " was never acknowledged";

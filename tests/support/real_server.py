@@ -69,9 +69,7 @@ class RealServer:
         return self
 
     def __exit__(self, *_):
-        self.process.send_signal(signal.SIGTERM)
-        self.process.wait(20)
-        self.process.stdout.close()
+        self.stop()
         self.end_engines()
         shutil.rmtree(self.path)
 
@@ -109,6 +107,13 @@ class RealServer:
 
     def kill(self):
         self.process.kill()
+        self._end()
+
+    def stop(self):
+        self.process.send_signal(signal.SIGTERM)
+        self._end()
+
+    def _end(self):
         self.process.wait(20)
         self.process.stdout.close()
 

@@ -120,6 +120,22 @@ bool holds_within(std::chrono::milliseconds limit, const std::function<bool()>& 
   return true;
 }
 
+std::vector<v1::Job> all_jobs(v1::JobService::Stub& stub) {
+  std::vector<v1::Job> jobs;
+  v1::ListJobsRequest request;
+  request.set_page_size(1000);
+  do {
+    grpc::ClientContext context;
+    context.set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(30));
+    v1::ListJobsResponse page;
+    const auto status = stub.ListJobs(&context, request, &page);
+    if (!status.ok()) throw std::runtime_error("the jobs are not listed: " + status.error_message());
+    jobs.insert(jobs.end(), page.jobs().begin(), page.jobs().end());
+    request.set_page_token(page.next_page_token());
+  } while (!request.page_token().empty());
+  return jobs;
+}
+
 v1::ErrorDetail detail_of(const grpc::Status& status) {
   v1::ErrorDetail detail;
   detail.ParseFromString(status.error_details());

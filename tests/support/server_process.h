@@ -66,6 +66,9 @@ class ServerProcess {
 // True as soon as it holds; false when it does not within the limit.
 bool holds_within(std::chrono::milliseconds limit, const std::function<bool()>& condition);
 
+// Every job that the server lists, page by page, newest first. Throws std::runtime_error when a page is refused.
+std::vector<v1::Job> all_jobs(v1::JobService::Stub& stub);
+
 v1::ErrorDetail detail_of(const grpc::Status& status);
 
 // All that a watcher is told behind `after`, until `until` says so, the stream ends or the deadline is over.

@@ -53,6 +53,18 @@ TEST(Crc32c, OfPartsIsThatOfTheWhole) {
   EXPECT_EQ(crc32c(""), 0U);
 }
 
+// Short spans and long ones are summed in different ways.
+TEST(Crc32c, OfEveryLengthIsThatOfItsDefinition) {
+  std::string bytes;
+  std::uint32_t remainder = ~0U;  // bit by bit: x³²+x²⁸+…, reflected
+  for (int length = 0; length <= 400; ++length) {
+    ASSERT_EQ(crc32c(bytes), ~remainder) << length;
+    bytes += static_cast<char>(length * 37 + length / 11);
+    remainder ^= static_cast<unsigned char>(bytes.back());
+    for (int bit = 0; bit < 8; ++bit) remainder = remainder >> 1 ^ (remainder & 1U ? 0x82F63B78U : 0U);
+  }
+}
+
 TEST_F(RecordLog, GivesBackWhatWasAppendedInOrder) {
   const std::vector<std::string> written{"one", "", std::string(3'000'000, 'x'), std::string("\0\1\2", 3)};  // one above a chunk
   LogWriter writer(path_);

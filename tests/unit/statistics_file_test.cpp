@@ -68,7 +68,8 @@ class StatisticsFile : public testing::Test {
     record.mutable_resumed()->set_step(step);
     write(record);
   }
-  void write(const v1::StatisticsRecord& record) { LogWriter(path_).append(0, record.SerializeAsString()); }
+  void write(const v1::StatisticsRecord& record) { write_bytes(record.SerializeAsString()); }
+  void write_bytes(const std::string& payload) { LogWriter(path_).append(0, payload); }
 
   v1::Statistics read(const StatisticsQuery& query = {}) const { return read_statistics(path_, query); }
 
@@ -117,6 +118,36 @@ TEST_F(StatisticsFile, GivesSeriesAndProfilesBack) {
   EXPECT_DOUBLE_EQ(found.profiles(0).deviation(0).mean(), 0.05);
   EXPECT_EQ(found.step(), 50U);
   EXPECT_DOUBLE_EQ(found.time(), 5);
+}
+
+// As engines write it a sample is read by a way of its own.
+TEST_F(StatisticsFile, ASampleIsReadInWhateverFormItIsWritten) {
+  write_schema();
+  v1::Sample sample;
+  sample.set_step(std::numeric_limits<std::uint64_t>::max());  // ten bytes
+  sample.set_time(2.5);
+  sample.set_value(-1e300);
+  const std::string without_monitor = sample.SerializeAsString();
+  sample.set_monitor(0);
+  const std::string plain = sample.SerializeAsString();
+  const std::string step = plain.substr(2, 11), time_and_value = plain.substr(13);
+  const std::string unknown = "\x78\x01";                                // field 15
+  const std::string twice = std::string("\x21") + std::string(8, '\0');  // a value that a later one replaces
+  for (const auto& bytes : {plain, without_monitor, time_and_value + step, unknown + plain, plain + unknown, twice + plain}) {
+    std::string record = "\x12";
+    record += static_cast<char>(bytes.size());
+    v1::StatisticsRecord expected;
+    ASSERT_TRUE(expected.ParseFromString(record + bytes) && expected.has_sample());
+    ASSERT_EQ(expected.sample().step(), sample.step());
+    write_bytes(record + bytes);
+  }
+  const auto statistics = read();
+  ASSERT_EQ(statistics.series(0).value_size(), 6);
+  for (int i = 0; i < 6; ++i) {
+    EXPECT_EQ(statistics.series(0).step(i), sample.step()) << i;
+    EXPECT_EQ(statistics.series(0).time(i), 2.5) << i;
+    EXPECT_EQ(statistics.series(0).value(i), -1e300) << i;
+  }
 }
 
 TEST_F(StatisticsFile, StepsRunAgainReplaceTheEarlierOnes) {
