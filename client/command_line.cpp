@@ -43,6 +43,7 @@ std::unique_ptr<CLI::App> command_line(Program& program) {
   add_field_verbs(app, program);
   add_checkpoint_verbs(app, program);
   add_study_verbs(app, program);
+  add_reproduce_verb(app, program);
   add_server_verbs(app, program);
   add_context_verbs(app, program);
   add_top_verb(app, program);

@@ -11,7 +11,7 @@
 #include "gnuplot.h"
 #include "interrupt.h"
 #include "job_request.h"
-#include "study_report.h"
+#include "study_follow.h"
 #include "terminal.h"
 #include "vary.h"
 #include "verbs.h"
@@ -158,61 +158,7 @@ v1::StudySpec spec_of(const StudyOptions& options) {
   return spec;
 }
 
-// ------------------------------------------------------------------------------------------------ following one
-
-std::string progress_of(const v1::Study& study) {
-  int ended = 0, running = 0;
-  std::string now;
-  for (int i = 0; i < study.runs_size(); ++i) {
-    const auto& run = study.runs(i);
-    if (run.has_state() && (is_final(run.state()) || run.interval_met())) ++ended;
-    if (run.state() != v1::RUNNING || run.interval_met()) continue;
-    if (running++ < 3)
-      now += (now.empty() ? "; now " : ", ") + point_name(study.spec(), i) + " at " + number_text(std::round(100 * run.done())) +
-             " %";
-  }
-  if (running > 3) now += " and " + std::to_string(running - 3) + " more";
-  if (ended == 0 && running == 0 && study.has_packing_job()) now = "; the particles are being packed";
-  return std::to_string(ended) + " of " + std::to_string(study.runs_size()) + " runs have ended" + now;
-}
-
-v1::Study get_study(const Connection& connection, const std::string& id) {
-  v1::GetStudyRequest request;
-  request.set_id(id);
-  return connection.call(&Stub::GetStudy, request, 60);
-}
-
-// Until it has ended. Nothing: interrupted.
-std::optional<v1::Study> follow(const Connection& connection, const std::string& id, Interrupt& interrupt, EmbeddedServer* own) {
-  const Terminal terminal(stderr);
-  std::string last;
-  auto said = std::chrono::steady_clock::time_point();
-  int lost = 0;
-  do {
-    std::optional<v1::Study> study;
-    try {
-      study = get_study(connection, id);
-      lost = 0;
-    } catch (const Failure& failure) {
-      if (failure.code != Exit::unreachable || ++lost > 30) throw;
-      if (own) own->revive();
-    }
-    if (study && study->state() != v1::STUDY_RUNNING) {
-      if (terminal.interactive()) std::fputs("\r\x1b[K", stderr);
-      return study;
-    }
-    const auto now = std::chrono::steady_clock::now();
-    const std::string line = study ? progress_of(*study) : "the server does not answer; trying again";
-    if (terminal.interactive()) {
-      std::fputs(("\r\x1b[K" + line.substr(0, static_cast<std::size_t>(std::max(20, terminal.width() - 1)))).c_str(), stderr);
-    } else if (line != last && now - said > 10s) {
-      say(line);
-      last = line;
-      said = now;
-    }
-  } while (!interrupt.wait(1000));
-  return std::nullopt;
-}
+// ------------------------------------------------------------------------------------------------ those there are
 
 void draw(const v1::Study& study, const std::string& file) {
   draw_picture(study_plot(study, file), file);
@@ -244,7 +190,7 @@ Exit begin(const Program& program, const StudyOptions& options) {
   const auto id = connection.call(&Stub::CreateStudy, request, 120).id();
   const std::string come_back = "bedflow study get " + id + (own ? " --server " + own->address() : program.server.words());
   say("study " + id + " of " + std::to_string(request.spec().points_size()) + " runs; come back: " + come_back);
-  const auto study = follow(connection, id, interrupt, own.get());
+  const auto study = follow_study(connection, id, interrupt, own.get());
   if (!study) {
     if (own) own->leave();
     say("\nthe study goes on; come back: " + come_back);
@@ -266,7 +212,7 @@ struct OneStudyOptions {
 Exit get(const Program& program, const OneStudyOptions& options) {
   const Connection connection(program.server);
   Interrupt interrupt;
-  const auto study = options.wait ? follow(connection, options.study, interrupt, nullptr) : get_study(connection, options.study);
+  const auto study = options.wait ? follow_study(connection, options.study, interrupt, nullptr) : get_study(connection, options.study);
   if (!study) return Exit::interrupted;
   if (options.format == Format::table)
     say("study " + study->id() + " is " + study_state_name(study->state()) + ": " + progress_of(*study));

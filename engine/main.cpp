@@ -78,8 +78,8 @@ int main(int argc, char** argv) {
 
   if (arguments.plans || !arguments.plan_case.empty()) return plan(arguments);
 
-  mallopt(M_MMAP_THRESHOLD, 8 << 20);   // large arrays that particles have outgrown go back to the system;
-  mallopt(M_TRIM_THRESHOLD, 32 << 20);  // what every rebuild of the pair list takes and gives stays
+  mallopt(M_MMAP_THRESHOLD, 2 << 20);  // large arrays that particles have outgrown go back to the system;
+  mallopt(M_TRIM_THRESHOLD, 8 << 20);  // what every rebuild of the pair list takes and gives stays
 
   const bedflow::MpiSession session(&argc, &argv);
   const Comm world = Comm::world();

@@ -11,6 +11,7 @@ bed     whole beds from a fluidized state, by CPU time and the engine's summary.
 presets the presets on the Müller bed: what they cost, and what they say of it
 peers   ours against LAMMPS on the same bed, in turn (needs Debian's package lammps)
 scaling 1 and 2 ranks measured, up to 10 000 predicted by the cost model of scaling.py
+trade   what the plan tells of a run before it, against what the run needs
 service submissions, 10 000 jobs, a million samples, 1000 watchers, on the real server and engine
 
 --record keeps the figures as this machine's baseline. The exit code is 1 when a figure is short of its target.
@@ -22,6 +23,7 @@ import sys
 
 import peers
 import scaling
+import trade
 from measuring import Baseline, Figure, cpu_seconds, engine, line, machine, run, scratch, sweep
 
 # Figure -> (direction, limit).
@@ -61,6 +63,8 @@ TARGETS = {
     "bed/goldschmidt-1.5@mfix-exa-2018/gas_and_transfer": ("<=", 30),
     "bed/mueller@mfix-exa-2018/cost": ("<=", 112),
     "bed/goldschmidt-1.5@mfix-exa-2018/cost": ("<=", 200),
+    **{f"trade/estimate/{what}/{scene}": ("<=", 1.3)
+       for what in ("seconds", "memory", "checkpoint") for scene in trade.SCENES},
     "service/submit/median": ("<=", 5),
     "service/list/first_page": ("<=", 50),
     "service/restart": ("<=", 2),
@@ -158,7 +162,7 @@ def service(bin_folder):
 
 
 GROUPS = {"dem": dem, "gas": gas, "transfer": transfer, "bed": bed, "presets": presets,
-          "peers": peers.against_lammps, "scaling": scaling.scaling,
+          "peers": peers.against_lammps, "scaling": scaling.scaling, "trade": trade.trade,
           "service": service}
 
 

@@ -1,0 +1,59 @@
+"""What a user is told before a run, against what the run then needs; and what a scene pays for what it does not use."""
+import os
+import pathlib
+import re
+import subprocess
+
+from measuring import Figure, one_core, run, scratch
+
+# Scene -> what is changed of the ready case, so that it takes seconds.
+SCENES = {
+    "mueller": ["time.end=0.15"],
+    "mueller@mfix-exa-2018": ["time.end=0.15"],
+    "goldschmidt-1.5": ["time.end=0.05"],
+    "link-b2": ["time.end=0.02"],
+    "settling": [],
+    "channel": [],
+}
+
+
+def case_of(bin_folder, scene, changes):
+    name, _, preset = scene.partition("@")
+    set_options = [part for change in changes for part in ("--set", change)]
+    return run([bin_folder / "bedflow", "init", name, *(["--preset", preset] if preset else []), *set_options])
+
+
+def told(bin_folder, case):
+    """Seconds, bytes of memory and bytes of a checkpoint, by the plan."""
+    text = run([bin_folder / "bedflow-engine", "--plan", case])
+    return {name: float(re.search(rf"^{name}: (\S+)", text, re.M)[1]) for name in ("seconds", "memory_bytes", "checkpoint_bytes")}
+
+
+def needed(bin_folder, folder):
+    """The same of the run: CPU seconds of the process, its largest resident set, its last checkpoint."""
+    with subprocess.Popen(["taskset", "-c", str(one_core()), bin_folder / "bedflow-engine", folder],
+                          stdout=subprocess.DEVNULL) as process:
+        _, status, used = os.wait4(process.pid, 0)
+        process.returncode = status
+    if status != 0:
+        raise SystemExit(f"figures.py: the engine ended with {status}")
+    checkpoints = sorted(pathlib.Path(folder).glob("checkpoints/*.h5"))
+    return {"seconds": used.ru_utime + used.ru_stime, "memory_bytes": 1024 * used.ru_maxrss,
+            "checkpoint_bytes": checkpoints[-1].stat().st_size}
+
+
+def estimates(bin_folder):
+    """How far off the plan is: the larger of the two over the smaller."""
+    for scene, changes in SCENES.items():
+        with scratch() as folder:
+            case = pathlib.Path(folder) / "case.txtpb"
+            case.write_text(case_of(bin_folder, scene, changes))
+            plan, real = told(bin_folder, case), needed(bin_folder, folder)
+        for name, unit, factor in (("seconds", "s", 1), ("memory_bytes", "MB", 1e-6), ("checkpoint_bytes", "MB", 1e-6)):
+            off = max(plan[name] / real[name], real[name] / plan[name])
+            yield Figure(f"trade/estimate/{name.removesuffix('_bytes')}/{scene}", off, "times off",
+                         [f"told {factor * plan[name]:.3g} {unit}", f"needed {factor * real[name]:.3g} {unit}"])
+
+
+def trade(bin_folder):
+    yield from estimates(bin_folder)
