@@ -83,9 +83,10 @@ Exit reproduce(const Program& program, const ReproduceOptions& options) {
   request.set_request_id(new_request_id());
   std::unique_ptr<EmbeddedServer> own;
   if (!options.data.empty()) own = std::make_unique<EmbeddedServer>(options.data);
-  const Connection connection(own ? own->address() : program.server);
+  const Connection connection(own ? ServerChoice{own->address(), ""} : program.server);
   const auto id = connection.call(&Stub::CreateStudy, request, 120).id();
-  say("study " + id + " of " + std::to_string(spec.points_size()) + " runs; Ctrl-C detaches, and the same command comes back to it: what has been run is not run again");
+  say("study " + id + " of " + std::to_string(spec.points_size()) +
+      " runs; Ctrl-C detaches, and the same command comes back to it: what has been run is not run again");
   const auto study = follow_study(connection, id, interrupt, own.get());
   if (!study) {
     if (own) own->leave();
@@ -103,7 +104,8 @@ Exit reproduce(const Program& program, const ReproduceOptions& options) {
 void add_reproduce_verb(CLI::App& app, Program& program) {
   const auto options = std::make_shared<ReproduceOptions>();
   auto* verb = app.add_subcommand("reproduce", "a published bed by several models, beside its experiment: a page with pictures");
-  verb->add_option("bed", options->bed, "mueller, goldschmidt, link or sscp: all conditions; or one, as goldschmidt-1.5")->required();
+  verb->add_option("bed", options->bed, "mueller, goldschmidt, link or sscp: all conditions; or one, as goldschmidt-1.5")
+      ->required();
   verb->add_option("--presets", options->presets, "models to run; all: every preset")->delimiter(',')->capture_default_str();
   verb->add_option("--from", options->from, "averages begin here, s; as the paper does if absent");
   verb->add_option("--bin", options->bin, "bin of time, s")->check(CLI::PositiveNumber);

@@ -22,7 +22,8 @@ std::vector<std::string> conditions_of(const std::string& bed) {
       if (name.starts_with(published)) known += (known.empty() ? "" : ", ") + name;
   }
   if (conditions.empty())
-    throw Failure(Exit::usage, "there is no published bed \"" + bed + "\"", "bedflow reproduce BED; the beds and conditions: " + known);
+    throw Failure(Exit::usage, "there is no published bed \"" + bed + "\"",
+                  "bedflow reproduce BED; the beds and conditions: " + known);
   return conditions;
 }
 

@@ -18,7 +18,7 @@ namespace bedflow::client {
 namespace {
 
 std::string label_of(const ReproducedRun& run) {
-  return "bedflow, " + run.preset;
+  return "ours, " + run.preset;
 }
 
 const v1::Series* series_of(const ReproducedRun& run, const std::string& monitor) {
@@ -99,7 +99,8 @@ void draw_values(const std::filesystem::path& file, const std::vector<const Repr
     const std::string name = fluctuation ? "fluctuation" : "mean";
     const std::string labels = " using 1:($2+0.28):4 with labels font \",9\" tc rgb \"#444444\" notitle";
     script += "$ours << EOD\n" + ours + "EOD\n$theirs << EOD\n" + (theirs.empty() ? "NaN NaN NaN \"\"\n" : theirs) + "EOD\n";
-    script += "set title " + gnuplot_quoted(monitor + ", " + name) + "\nunset ytics\nset yrange [" + std::to_string(-at) + ":0.8]\n";
+    script +=
+        "set title " + gnuplot_quoted(monitor + ", " + name) + "\nunset ytics\nset yrange [" + std::to_string(-at) + ":0.8]\n";
     script += "set xlabel " + gnuplot_quoted(series_of(*runs.front(), monitor)->unit()) + "\nunset key\n";
     script += "plot $theirs using 1:2:3 with xerrorbars pt 6 ps 1.3 lw 1.4 lc rgb \"#c0392b\", $theirs" + labels +
               ", $ours using 1:2:3 with xerrorbars pt 7 ps 1.3 lw 1.6 lc rgb \"#1f5fa8\", $ours" + labels + "\n";
@@ -136,7 +137,9 @@ double at(const Curve& curve, double place) {
 }
 
 std::string profile_table(const std::vector<const ReproducedRun*>& runs, const std::string& monitor) {
-  std::string text = "| | mean over the width | published source | its mean | root mean square of the differences, place by place |\n|---|---|---|---|---|\n";
+  std::string text =
+      "| | mean over the width | published source | its mean | root mean square of the differences, place by place "
+      "|\n|---|---|---|---|---|\n";
   for (const auto* run : runs) {
     const Curve ours = curve_of(*profile_of(*run, monitor));
     for (const auto& reference : references_of(run->scene, monitor, false)) {
@@ -164,8 +167,8 @@ void draw_profiles(const std::filesystem::path& file, const std::vector<const Re
     const std::string name = "$run" + std::to_string(index), colour = colours[index % std::size(colours)];
     blocks += name + " << EOD\n";
     for (std::size_t i = 0; i < curve.place.size(); ++i)
-      blocks += number_text(1e3 * curve.place[i]) + " " + (std::isfinite(curve.value[i]) ? number_text(curve.value[i]) : "NaN") + " " +
-                number_text(curve.half_width[i]) + "\n";
+      blocks += number_text(1e3 * curve.place[i]) + " " + (std::isfinite(curve.value[i]) ? number_text(curve.value[i]) : "NaN") +
+                " " + number_text(curve.half_width[i]) + "\n";
     blocks += "EOD\n";
     draws += (draws.empty() ? "" : ", \\\n  ") + name + " using 1:($2-$3):($2+$3) with filledcurves fc rgb \"" + colour +
              "\" fs transparent solid 0.18 notitle, " + name + " using 1:2 with lines lw 2 lc rgb \"" + colour + "\" title " +
@@ -178,8 +181,8 @@ void draw_profiles(const std::filesystem::path& file, const std::vector<const Re
     blocks += name + " << EOD\n";
     for (const auto& point : reference.points()) blocks += number_text(1e3 * point.x()) + " " + number_text(point.value()) + "\n";
     blocks += "EOD\n";
-    draws += ", \\\n  " + name + " using 1:2 with points pt " + std::to_string(symbol) + " ps 1.2 lw 1.3 lc rgb \"#c0392b\" title " +
-             gnuplot_quoted(reference.source());
+    draws += ", \\\n  " + name + " using 1:2 with points pt " + std::to_string(symbol) +
+             " ps 1.2 lw 1.3 lc rgb \"#c0392b\" title " + gnuplot_quoted(reference.source());
     symbol += 2;
   }
   std::string script = picture_head(file, {900, 620}) + blocks;
@@ -199,7 +202,8 @@ std::string today() {
 }
 
 std::string runs_table(const std::vector<ReproducedRun>& runs) {
-  std::string text = "| condition | preset | simulated | averaged from | bins | CPU s per simulated s |\n|---|---|---|---|---|---|\n";
+  std::string text =
+      "| condition | preset | simulated | averaged from | bins | CPU s per simulated s |\n|---|---|---|---|---|---|\n";
   for (const auto& run : runs) {
     const auto averaged = std::ranges::find_if(run.scene.monitors(), [](const auto& monitor) { return monitor.has_averaging(); });
     text += "| " + run.condition + " | " + run.preset + " | " + number_text(run.scene.time().end()) + " s | " +
@@ -221,7 +225,8 @@ std::string condition_text(const std::filesystem::path& folder, const std::vecto
     if (!is_known && !is_series) continue;
     text += "\n### " + name + (is_series ? ", " + series_of(*runs.front(), name)->unit() : "") + "\n\n";
     if (is_series) {
-      text += "Mean in time:\n\n" + value_table(runs, name, false) + "\nFluctuation in time (standard deviation):\n\n" + value_table(runs, name, true);
+      text += "Mean in time:\n\n" + value_table(runs, name, false) + "\nFluctuation in time (standard deviation):\n\n" +
+              value_table(runs, name, true);
     } else {
       text += profile_table(runs, name);
     }
@@ -243,11 +248,12 @@ std::filesystem::path write_page(const std::filesystem::path& folder, const std:
   std::error_code failed;
   std::filesystem::create_directories(folder, failed);
   if (failed) throw Failure(Exit::other, "the folder " + folder.string() + " cannot be made: " + failed.message());
-  std::string text = "# " + name + ", reproduced\n\nMade by `" + command + "`, bedflow " BEDFLOW_VERSION ", " + today() + ".\n\n" +
-                     runs_table(runs) +
-                     "\nTwo values a ± δa and b ± δb agree when (|a − b| − δa − δb) / ((a + b)/2) ≤ 0, the measure of arXiv 1909.02067; "
-                     "otherwise they are that far apart. Published values without an interval count as exact. Profiles of ours are "
-                     "averaged with their mirror image.\n";
+  std::string text =
+      "# " + name + ", reproduced\n\nMade by `" + command + "`, bedflow " BEDFLOW_VERSION ", " + today() + ".\n\n" +
+      runs_table(runs) +
+      "\nTwo values a ± δa and b ± δb agree when (|a − b| − δa − δb) / ((a + b)/2) ≤ 0, the measure of arXiv 1909.02067; "
+      "otherwise they are that far apart. Published values without an interval count as exact. Profiles of ours are "
+      "averaged with their mirror image.\n";
   std::vector<std::string> conditions;
   for (const auto& run : runs)
     if (std::ranges::find(conditions, run.condition) == conditions.end()) conditions.push_back(run.condition);

@@ -17,7 +17,8 @@ std::string progress_of(const v1::Study& study) {
     if (run.has_state() && (is_final(run.state()) || run.interval_met())) ++ended;
     if (run.state() != v1::RUNNING || run.interval_met()) continue;
     if (running++ < 3)
-      now += (now.empty() ? "; now " : ", ") + point_name(study.spec(), i) + " at " + number_text(std::round(100 * run.done())) + " %";
+      now += (now.empty() ? "; now " : ", ") + point_name(study.spec(), i) + " at " + number_text(std::round(100 * run.done())) +
+             " %";
   }
   if (running > 3) now += " and " + std::to_string(running - 3) + " more";
   if (ended == 0 && running == 0 && study.has_packing_job()) now = "; the particles are being packed";
@@ -30,7 +31,8 @@ v1::Study get_study(const Connection& connection, const std::string& id) {
   return connection.call(&Stub::GetStudy, request, 60);
 }
 
-std::optional<v1::Study> follow_study(const Connection& connection, const std::string& id, Interrupt& interrupt, EmbeddedServer* own) {
+std::optional<v1::Study> follow_study(const Connection& connection, const std::string& id, Interrupt& interrupt,
+                                      EmbeddedServer* own) {
   const Terminal terminal(stderr);
   std::string last;
   auto said = std::chrono::steady_clock::time_point();

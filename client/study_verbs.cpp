@@ -212,7 +212,8 @@ struct OneStudyOptions {
 Exit get(const Program& program, const OneStudyOptions& options) {
   const Connection connection(program.server);
   Interrupt interrupt;
-  const auto study = options.wait ? follow_study(connection, options.study, interrupt, nullptr) : get_study(connection, options.study);
+  const auto study =
+      options.wait ? follow_study(connection, options.study, interrupt, nullptr) : get_study(connection, options.study);
   if (!study) return Exit::interrupted;
   if (options.format == Format::table)
     say("study " + study->id() + " is " + study_state_name(study->state()) + ": " + progress_of(*study));

@@ -24,7 +24,7 @@ void add_watch_verbs(CLI::App& app, Program& program);       // watch, wait, log
 void add_result_verbs(CLI::App& app, Program& program);      // stats, plot, render
 void add_field_verbs(CLI::App& app, Program& program);       // field
 void add_checkpoint_verbs(CLI::App& app, Program& program);  // checkpoint
-void add_reproduce_verb(CLI::App& app, Program& program);     // reproduce
+void add_reproduce_verb(CLI::App& app, Program& program);    // reproduce
 void add_study_verbs(CLI::App& app, Program& program);       // study
 void add_server_verbs(CLI::App& app, Program& program);      // server
 void add_token_verbs(CLI::App* server, Program& program);    // server token

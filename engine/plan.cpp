@@ -18,13 +18,18 @@ namespace {
 // Measured on one core (deploy/bench.sh dem, transfer and gas print them anew); they make the estimate of the wall time and the
 // balance between ranks.
 constexpr double particle_substep_seconds = 9e-9;  // motion, walls
-constexpr double pair_substep_seconds = 4.8e-9;    // a listed pair, about every second touches: found, swept, listed
+constexpr double pair_substep_seconds = 4.4e-9;    // a listed pair, about every second touches: found, swept, listed
 constexpr double history_factor = 2;               // of a pair
 constexpr double resting_pairs = 3.7;              // listed, a particle
-constexpr double fluidized_pairs = 1.2;
+constexpr double fluidized_pairs = 1.05;
 constexpr double particle_step_seconds = 0.06e-6;  // to the grid and back
-constexpr double cell_step_seconds = 0.25e-6;      // two outer iterations of SIMPLE
-constexpr double projection_cell_seconds = 0.21e-6;
+constexpr double cell_step_seconds = 0.18e-6;      // two outer iterations of SIMPLE
+constexpr double projection_cell_seconds = 0.16e-6;
+constexpr double start_seconds = 0.3;   // of the process
+constexpr double process_bytes = 27e6;  // with MPI and HDF5, before it holds anything
+constexpr double copies = 1.9;          // of what it holds, while a list is rebuilt or a checkpoint written
+constexpr double contact_bytes = 64;    // in a checkpoint
+constexpr double fluidized_contacts = 0.5, resting_contacts = 2.5;  // a particle, with history
 
 constexpr double widest_skin =
     0.8;  // of a cell: half of it a particle may be outside its block, where the halo must know the gas
@@ -165,9 +170,11 @@ void plan_cost(Plan& plan) {
   const auto particles = static_cast<double>(plan.particle_count + plan.entering);  // at most: some leave
   // Fields of gas, exchange and pressure solver; arrays and pair list of the particles (about 8 pairs within reach of each).
   const double field = cells > 0 ? cells * sizeof(double) : 0;
-  plan.memory_bytes = 40e6 * plan.ranks + field * (scene.coupling ? 72 : 38) +
-                      particles * (24.0 * (rotation ? 8 : 5) + 16 + 8 * (4 + (history ? 25 : 0)));
-  plan.checkpoint_bytes = 100e3 + field * 5 + particles * (8 + 24.0 * (rotation ? 4 : 3) + (history ? 3 * 40 : 0));
+  plan.memory_bytes =
+      process_bytes * plan.ranks +
+      copies * (field * (scene.coupling ? 72 : 38) + particles * (24.0 * (rotation ? 8 : 5) + 16 + 8 * (4 + (history ? 25 : 0))));
+  const double contacts = !history ? 0 : scene.coupling ? fluidized_contacts : resting_contacts;
+  plan.checkpoint_bytes = 30e3 + field * 5 + particles * (8 + 24.0 * (rotation ? 4 : 3) + contacts * contact_bytes);
   const auto steps = static_cast<double>(plan.steps);
   const bool projection = scene.gas && scene.gas->setup.method == GasMethod::projection;
   StepCost& cost = plan.cost;
@@ -180,7 +187,7 @@ void plan_cost(Plan& plan) {
     const double settled = std::min(1.2 * plan.fall_time, scene.particles->settling->duration);  // at rest soon after
     plan.seconds += settled / plan.step * particles * (cost.particle + resting_pairs * cost.pair);
   }
-  plan.seconds /= plan.ranks;
+  plan.seconds = start_seconds + plan.seconds / plan.ranks;
 }
 
 void check_memory(Plan& plan) {

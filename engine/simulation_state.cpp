@@ -213,8 +213,8 @@ void Simulation::put_contacts(CheckpointContent& content) const {
 void Simulation::require_same(const CheckpointSource& from, const std::string& name, const std::string& field, double here) {
   const double there = from.number(name);
   if (std::abs(there - here) <= 1e-12 * std::abs(here)) return;
-  throw Stop(Reason::invalid_case, "the checkpoint is of another scene: " + field + " is " + short_number(there) +
-                                       " there and " + short_number(here) + " in the case");
+  throw Stop(Reason::invalid_case, "the checkpoint is of another scene: " + field + " is " + short_number(there) + " there and " +
+                                       short_number(here) + " in the case");
 }
 
 void Simulation::require_same_box(const CheckpointSource& from) const {

@@ -10,7 +10,7 @@ from measuring import Figure, one_core, run, scratch
 SCENES = {
     "mueller": ["time.end=0.15"],
     "mueller@mfix-exa-2018": ["time.end=0.15"],
-    "goldschmidt-1.5": ["time.end=0.05"],
+    "goldschmidt-1.5": ["time.end=0.3", "domain.faces.y_low.inflow.ramp.duration=0.1"],
     "link-b2": ["time.end=0.02"],
     "settling": [],
     "channel": [],

@@ -149,7 +149,8 @@ TEST_F(RealStudy, IsRefusedWithWhatIsWrongAndCancelledWithItsJobs) {
   EXPECT_THAT(refused(asked), testing::AllOf(testing::HasSubstr("point 1 (10)"), testing::HasSubstr("steps_per_collision")));
   asked = request({20}, 100);
   asked.mutable_spec()->set_reference(7);
-  EXPECT_THAT(refused(asked), testing::AllOf(testing::HasSubstr("allowed are 2 to 1000"), testing::HasSubstr("is 7, but there are 1")));
+  EXPECT_THAT(refused(asked),
+              testing::AllOf(testing::HasSubstr("allowed are 2 to 1000"), testing::HasSubstr("is 7, but there are 1")));
   EXPECT_TRUE(jobs().empty());
 
   const auto id = create(request({20, 10}, 100)).id();

@@ -173,8 +173,8 @@ TEST_F(JobRun, APackingIsTakenAsItLies) {
     const auto places = reader.rows("particles/position"), velocities = reader.rows("particles/velocity");
     std::vector<double> mine;
     for (std::size_t i = 0; i < ids.size(); ++i)
-      mine.insert(mine.end(), {static_cast<double>(ids[i]), places[3 * i], places[3 * i + 1], places[3 * i + 2], velocities[3 * i],
-                               velocities[3 * i + 1], velocities[3 * i + 2]});
+      mine.insert(mine.end(), {static_cast<double>(ids[i]), places[3 * i], places[3 * i + 1], places[3 * i + 2],
+                               velocities[3 * i], velocities[3 * i + 1], velocities[3 * i + 2]});
     const auto all = comm.gather_all(mine);
     for (std::size_t i = 0; i < all.size(); i += 7)
       particles[all[i]] = {all.begin() + static_cast<std::ptrdiff_t>(i) + 1, all.begin() + static_cast<std::ptrdiff_t>(i) + 7};
