@@ -1,6 +1,9 @@
 #include "job_request.h"
 
+#include <charconv>
 #include <chrono>
+#include <cmath>
+#include <map>
 #include <random>
 #include <thread>
 
@@ -37,6 +40,27 @@ v1::CheckpointName checkpoint_name(const std::string& text) {
   return name;
 }
 
+void add_wall_limit(CLI::App* verb, std::optional<double>& seconds) {
+  const auto read = [&seconds](const std::string& text) {
+    const std::map<std::string, double> units = {{"", 1}, {"s", 1}, {"min", 60}, {"m", 60}, {"h", 3600}, {"d", 86400}};
+    double number = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+    const auto unit = units.find(std::string(end, text.data() + text.size()));
+    if (error != std::errc() || unit == units.end() || !std::isfinite(number) || number <= 0)
+      throw CLI::ValidationError("--wall-limit", text + " is no time; say e.g. 90 (seconds), 30min, 2h or 1.5d");
+    seconds = number * unit->second;
+  };
+  verb->add_option_function<std::string>("--wall-limit", read,
+                                         "stop at a checkpoint after so much wall time of an attempt: 90 (s), 30min, 2h, 1d")
+      ->type_name("TIME");
+}
+
+CLI::Option* add_priority(CLI::App* verb, std::optional<int>& priority) {
+  return verb->add_option("--priority", priority, "-1000 to 1000: the highest starts first, the oldest among equals")
+      ->check(CLI::Range(-1000, 1000))
+      ->default_str("0");
+}
+
 void add_job_options(CLI::App* verb, JobOptions& options) {
   verb->add_option("--set", options.set, "change a parameter, as in time.end=2")->type_name("PATH=VALUE");
   verb->add_option("--end", options.end, "simulated time at which to end, s")->check(CLI::PositiveNumber);
@@ -50,7 +74,11 @@ void add_job_options(CLI::App* verb, JobOptions& options) {
   verb->add_option("--keep-every", options.keep_every, "and of the older ones every so-manieth")->check(CLI::PositiveNumber);
   verb->add_option("--keep-every-time", options.keep_every_time, "and the first in each such span of simulated time, s")
       ->check(CLI::PositiveNumber);
-  verb->add_option("--wall-limit", options.wall_limit, "stop after so much wall time, s")->check(CLI::PositiveNumber);
+  add_wall_limit(verb, options.wall_limit);
+  verb->add_option("--at-wall-limit", options.at_wall_limit,
+                   "end there, to be resumed, or requeue: wait for its turn again and go on; at a checkpoint in any case")
+      ->check(CLI::IsMember({"end", "requeue"}))
+      ->default_str("end");
   verb->add_option("--label", options.labels, "label to find the job by")->type_name("NAME=VALUE");
 }
 
@@ -70,6 +98,9 @@ v1::CreateJobRequest create_request(const JobOptions& options) {
   if (options.keep_every) spec.mutable_checkpoints()->set_keep_every_nth(*options.keep_every);
   if (options.keep_every_time) spec.mutable_checkpoints()->set_keep_every_simulated_seconds(*options.keep_every_time);
   if (options.wall_limit) spec.set_wall_limit_seconds(*options.wall_limit);
+  if (options.at_wall_limit == "requeue") spec.set_at_wall_limit(v1::JobSpec::REQUEUE);
+  if (!options.executor.empty()) spec.set_executor(options.executor);
+  if (options.priority) spec.set_priority(*options.priority);
   set_labels(spec, options.labels);
   return request;
 }

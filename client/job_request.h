@@ -21,10 +21,16 @@ struct JobOptions {
   std::optional<std::uint32_t> keep, keep_every;  // checkpoints
   std::optional<double> keep_every_time;          // simulated s
   std::optional<double> wall_limit;               // s
-  std::vector<std::string> labels;                // name=value
+  std::string at_wall_limit;                      // "end" or "requeue"; empty: the server's default
+  std::string executor;                           // the server's default if empty
+  std::optional<int> priority;
+  std::vector<std::string> labels;  // name=value
 };
 
 void add_job_options(CLI::App* verb, JobOptions& options);
+// --wall-limit: seconds, or a number with s, min, h or d.
+void add_wall_limit(CLI::App* verb, std::optional<double>& seconds);
+CLI::Option* add_priority(CLI::App* verb, std::optional<int>& priority);
 
 // With a random request id, so that the call may be repeated. Throws Failure when the case has faults.
 v1::CreateJobRequest create_request(const JobOptions& options);

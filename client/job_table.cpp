@@ -44,6 +44,7 @@ Table table_of(const v1::Job& job) {
   table.add({"state", state_text(job)});
   if (job.has_owner()) table.add({"owner", job.owner()});
   if (!job.message().empty()) table.add({"message", job.message()});
+  if (!job.waits_for().empty()) table.add({"waits for", job.waits_for()});
   table.add({"progress", progress_text(job)});
   if (job.has_progress()) {
     table.add({"time", number_text(job.progress().time()) + " of " + number_text(job.progress().end_time()) + " s"});
@@ -52,6 +53,15 @@ Table table_of(const v1::Job& job) {
   }
   if (const auto eta = eta_cell(job); eta != Cell()) table.add({"eta", eta});
   table.add({"ranks", std::to_string(job.spec().ranks())});
+  if (job.spec().executor() != "local") table.add({"executor", job.spec().executor()});
+  if (!job.batch_job().empty()) table.add({"Slurm's job", job.batch_job() + (job.node().empty() ? "" : " on " + job.node())});
+  if (job.spec().priority() != 0) table.add({"priority", std::to_string(job.spec().priority())});
+  if (job.spec().wall_limit_seconds() > 0) {
+    table.add({"wall limit",
+               duration_text(job.spec().wall_limit_seconds()) +
+                   (job.spec().at_wall_limit() == v1::JobSpec::REQUEUE ? ", then it goes on when its turn comes again" : "")});
+  }
+  if (job.planned_memory_bytes() > 0) table.add({"planned memory", bytes_text(static_cast<double>(job.planned_memory_bytes()))});
   table.add({"attempts", std::to_string(job.epoch())});
   table.add({"created", time_text(job.created_unix_nanos())});
   table.add({"changed", time_text(job.changed_unix_nanos())});

@@ -147,6 +147,8 @@ struct OneJobOptions {
   bool with_case = false, skip_checkpoint = false;
   std::optional<std::uint64_t> step;
   std::optional<std::uint32_t> ranks;
+  std::optional<double> wall_limit;  // s
+  std::optional<int> priority;
   Format format = Format::table;
 };
 
@@ -184,6 +186,8 @@ Exit resume(const Program& program, const OneJobOptions& options) {
   request.set_id(options.job);
   if (options.step) request.set_step(*options.step);
   if (options.ranks) request.set_ranks(*options.ranks);
+  if (options.wall_limit) request.set_wall_limit_seconds(*options.wall_limit);
+  if (options.priority) request.set_priority(*options.priority);
   return show_changed(Connection(program.server).call(&Stub::ResumeJob, request, 60), options.format);
 }
 
@@ -210,6 +214,10 @@ void add_job_verbs(CLI::App& app, Program& program) {
   auto* verb = app.add_subcommand("submit", "hand a case to the server; prints the id of the job");
   verb->add_option("case", submit_options->where, "file, - for stdin, or a ready case");
   add_job_options(verb, *submit_options);
+  verb->add_option("--executor", submit_options->executor, "where it runs: local, or slurm where the server has it")
+      ->type_name("NAME")
+      ->default_str("local");
+  add_priority(verb, submit_options->priority);
   verb->add_option("--start-from,--from", submit_options->start_from,
                    "start from a checkpoint of a job; without a case its own, which --set changes")
       ->type_name("JOB[@STEP]");
@@ -262,6 +270,8 @@ void add_job_verbs(CLI::App& app, Program& program) {
   const auto resume_options = one_job("resume", "go on from a checkpoint", resume);
   verb->add_option("--step", resume_options->step, "checkpoint of this step; the newest good one if absent");
   verb->add_option("--ranks", resume_options->ranks, "on so many ranks; as before if absent")->check(CLI::Range(1, 100000));
+  add_wall_limit(verb, resume_options->wall_limit);
+  add_priority(verb, resume_options->priority)->default_str("as before");
 }
 
 }  // namespace bedflow::client

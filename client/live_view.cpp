@@ -36,6 +36,10 @@ class LiveView {
       if (!response.has_event() && response.job().has_progress() && *state_ == v1::RUNNING)
         display_.update(response.job().progress());
     }
+    if (response.has_job() && response.job().waits_for() != waits_for_) {
+      waits_for_ = response.job().waits_for();
+      if (!waits_for_.empty()) display_.message("waits for " + waits_for_);
+    }
     if (!response.has_event()) return;
     const auto& event = response.event();
     if (format_ == Format::json || format_ == Format::jsonl) print_data(json_text(event, false));
@@ -50,6 +54,7 @@ class LiveView {
   ProgressDisplay display_;
   Format format_;
   std::optional<v1::JobState> state_;
+  std::string waits_for_;
 };
 
 std::string removed_text(const v1::CheckpointWritten& written) {

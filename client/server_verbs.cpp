@@ -11,6 +11,32 @@ struct InfoOptions {
   Format format = Format::table;
 };
 
+// "3 of 4 slots, 1.2 of 8 GB by plans"; of a batch system how many of its jobs run and wait.
+std::string executor_text(const v1::ExecutorInfo& info) {
+  std::string text;
+  if (info.name() == "local") {
+    text = std::to_string(info.ranks_in_use()) + " of " + std::to_string(info.slots()) + " slots in use";
+  } else {
+    text = std::to_string(info.jobs_running()) + " running, " + std::to_string(info.jobs_queued()) + " in its queue, " +
+           std::to_string(info.ranks_in_use()) + " ranks; at most " + std::to_string(info.slots()) + " a job";
+  }
+  if (info.memory_bytes() > 0) {
+    text += ", " + bytes_text(static_cast<double>(info.memory_in_use())) + " of " +
+            bytes_text(static_cast<double>(info.memory_bytes())) + " by plans";
+  }
+  if (!info.trouble().empty()) text += "; it does not answer: " + info.trouble();
+  return text;
+}
+
+std::string queued_text(const v1::QueuedJob& job) {
+  std::string text =
+      job.id() + " " + job.case_name() + ", " + std::to_string(job.ranks()) + (job.ranks() == 1 ? " rank" : " ranks");
+  if (job.priority() != 0) text += ", priority " + std::to_string(job.priority());
+  if (job.executor() != "local") text += ", " + job.executor();
+  if (!job.waits_for().empty()) text += "; waits for " + job.waits_for();
+  return text;
+}
+
 Exit server_info(const Program& program, const InfoOptions& options) {
   const Connection connection(program.server);
   const auto info = connection.call(&Stub::GetServerInfo, v1::GetServerInfoRequest());
@@ -24,9 +50,10 @@ Exit server_info(const Program& program, const InfoOptions& options) {
   table.add({"address", info.address().empty() ? connection.address() : info.address()});
   if (info.has_caller()) table.add({"you are", info.caller() + ", " + v1::Scope_Name(info.caller_scope())});
   table.add({"executors", joined(info.executors())});
-  table.add({"ranks in use", std::to_string(info.ranks_in_use()) + " of " + std::to_string(info.slots())});
+  for (const auto& executor : info.executor_infos()) table.add({executor.name(), executor_text(executor)});
   table.add({"jobs running", std::to_string(info.jobs_running())});
   table.add({"jobs pending", std::to_string(info.jobs_pending())});
+  for (const auto& job : info.queue()) table.add({"next", queued_text(job)});
   table.add({"disk free", bytes_text(static_cast<double>(info.disk_free_bytes()))});
   for (const auto& law : info.built_laws()) table.add({"model", law});
   print_message(info, table, options.format);

@@ -82,6 +82,7 @@ Reason Run::run() {
 }
 
 void Run::start() {
+  timer_.set_pulse([this] { folder_.heartbeat().beat(); });
   scene_ = read_scene(options_.folder / "case.txtpb");
   plan_with(0);
   const std::string from = begin();
@@ -106,7 +107,7 @@ void Run::start() {
 
 // The summary is of the steps.
 void Run::begin_totals() {
-  timer_ = PhaseTimer();
+  timer_.restart();
   totals_.cpu_seconds = -cpu_seconds();
 }
 
@@ -120,6 +121,7 @@ void Run::plan_with(int halvings) {
 // Takes up the newest good checkpoint, or the one asked for, and says its name; else the state at time 0, of the packing that the
 // folder may have.
 std::string Run::begin() {
+  const Heartbeat::Meanwhile meanwhile(folder_.heartbeat(), std::chrono::minutes(10));  // much may have to be read
   const auto checkpoints = options_.folder / "checkpoints";
   std::optional<CheckpointInfo> found;
   if (options_.from) {
@@ -243,7 +245,9 @@ void Run::count_rebuilds() {
 }
 
 void Run::finish(Stop& outcome) {
-  if (outcome.reason == Reason::stale_epoch) {  // the folder is the later attempt's
+  if (comm_.any(folder_.is_removed())) outcome = Stop(Reason::folder_removed, removed_text());
+  if (outcome.reason == Reason::stale_epoch ||
+      outcome.reason == Reason::folder_removed) {  // it is the later attempt's, or nobody's
     folder_.leave();
     if (comm_.root()) std::fprintf(stderr, "bedflow-engine: %s\n", outcome.what());
     return;
@@ -285,7 +289,7 @@ void Run::finish(Stop& outcome) {
 Run::Agreement Run::agree() {
   Failure mine = simulation_->failure();
   if (!mine) mine = folder_.failure();
-  if (!mine) mine = later_attempt();
+  if (!mine) mine = lost_folder();
   const Command command = folder_.poll();
   std::array<double, 6> flags{};
   flags[0] = static_cast<bool>(mine);
@@ -293,7 +297,7 @@ Run::Agreement Run::agree() {
   flags[2] = command == Command::suspend || signal_stop;
   flags[3] = command == Command::cancel;
   flags[4] = command == Command::cancel_now;
-  flags[5] = comm_.root() && policy_.wall_limit > 0 && wall_seconds() > policy_.wall_limit;
+  flags[5] = command == Command::limit || (comm_.root() && policy_.wall_limit > 0 && wall_seconds() > policy_.wall_limit);
   signal_checkpoint = 0;
   comm_.sum(flags);
   Agreement agreed{{}, flags[1] > 0, flags[2] > 0, flags[3] > 0, flags[4] > 0, flags[5] > 0};
@@ -306,10 +310,19 @@ Run::Agreement Run::agree() {
   return agreed;
 }
 
-// Another attempt at the job: from now on nothing is written, the folder is the other's.
-Failure Run::later_attempt() {
-  if (!comm_.root() || options_.epoch == 0 || wall_seconds() < next_look_) return {};
+std::string Run::removed_text() const {
+  return "the job folder " + options_.folder.string() + " has been removed: there is nowhere to write to, and the run ends";
+}
+
+// Gone, or another attempt's at the job: from now on nothing is written.
+Failure Run::lost_folder() {
+  if (!comm_.root() || wall_seconds() < next_look_) return {};
   next_look_ = wall_seconds() + 0.1;
+  if (folder_.is_removed()) {
+    folder_.leave();
+    return {Reason::folder_removed, removed_text()};
+  }
+  if (options_.epoch == 0) return {};
   const std::uint64_t newest = newest_attempt(options_.folder);
   if (newest <= options_.epoch) return {};
   folder_.leave();

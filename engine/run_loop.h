@@ -43,7 +43,8 @@ class Run {
   void count_step();
   void count_rebuilds();
   Agreement agree();
-  Failure later_attempt();
+  Failure lost_folder();
+  std::string removed_text() const;
   bool checkpoint_due() const;
 
   // ---- what is written (run_output.cpp)

@@ -28,6 +28,9 @@ void Run::report_progress(const char* phase) {
 
 void Run::write_checkpoint_now() {
   const PhaseTimer::Scope scope(timer_, Phase::checkpoint);
+  constexpr double slowest_disk = 5e6;  // bytes/s
+  const Heartbeat::Meanwhile meanwhile(folder_.heartbeat(),
+                                       std::chrono::duration<double>(120 + plan_.checkpoint_bytes / slowest_disk));
   const double before = wall_seconds();
   CheckpointContent content = simulation_->checkpoint();
   content.numbers["guard/halvings"] = halvings_;
@@ -86,6 +89,7 @@ void Run::write_plots_due() {
 void Run::write_plots() {
   if (!plan_.scene.plot_interval) return;
   const PhaseTimer::Scope scope(timer_, Phase::output);
+  const Heartbeat::Meanwhile meanwhile(folder_.heartbeat(), std::chrono::minutes(2));
   try {
     write_plot_files(comm_, options_.folder / "plots", *simulation_);
   } catch (const Stop& stop) {

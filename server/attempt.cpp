@@ -5,13 +5,19 @@
 
 namespace bedflow::server {
 
+std::string heartbeat_of(const JobFolder& folder) {
+  std::string beat = read_text(folder.heartbeat());  // opening it also has a network file system look at the server's copy
+  std::error_code missing;
+  const auto touched = std::filesystem::last_write_time(folder.heartbeat(), missing);
+  // The time too: on a disk that is full from the start there is no room for the count.
+  return missing ? std::string() : beat + " " + std::to_string(touched.time_since_epoch().count());
+}
+
 Attempt::Attempt(JobFolder folder, std::uint32_t epoch) : folder_(std::move(folder)), epoch_(epoch), reader_(folder_.events()) {}
 
 bool Attempt::look(const std::shared_ptr<Feed>& feed) {
-  std::error_code missing;
-  const auto touched = std::filesystem::last_write_time(folder_.heartbeat(), missing);
-  if (!missing && touched != heartbeat_) {  // a change is told, not an age: clocks may jump
-    heartbeat_ = touched;
+  if (auto beat = heartbeat_of(folder_); beat != heartbeat_) {  // a change is told, not an age: clocks may jump, and differ
+    heartbeat_ = std::move(beat);
     heard_ = std::chrono::steady_clock::now();
   }
   const auto before = last_sequence_;

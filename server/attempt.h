@@ -12,13 +12,12 @@
 #include "folder.h"
 #include "follow.h"
 #include "record_log.h"
+#include "states.h"
 
 namespace bedflow::server {
 
-struct Ending {
-  v1::StopReason reason;
-  std::string message;
-};
+// What a living engine changes at least once a second. Only a change says something: the clocks of the machines may differ.
+std::string heartbeat_of(const JobFolder& folder);
 
 class Attempt {
  public:
@@ -34,8 +33,9 @@ class Attempt {
   const std::optional<v1::Stopped>& stopped() const { return stopped_; }
   const v1::Progress& progress() const { return progress_; }  // newest of the job
   std::uint64_t last_sequence() const { return last_sequence_; }
-  const v1::Event& checkpoint() const { return checkpoint_; }  // the newest CheckpointWritten, whoever wrote it
-  // Since the engine's last sign of life, or since this began to look.
+  const v1::Event& checkpoint() const { return checkpoint_; }   // the newest CheckpointWritten, whoever wrote it
+  void expect() { heard_ = std::chrono::steady_clock::now(); }  // it cannot give signs of life yet
+  // Since the engine's last sign of life, or since this began to look or expects it.
   std::chrono::steady_clock::duration silence() const { return std::chrono::steady_clock::now() - heard_; }
 
   std::int64_t ended_unix_nanos() const;  // by the exit record; now if there is none
@@ -55,7 +55,7 @@ class Attempt {
   v1::Progress progress_;
   v1::Event checkpoint_;
   std::uint64_t last_sequence_ = 0;
-  std::filesystem::file_time_type heartbeat_{};
+  std::string heartbeat_;
   std::chrono::steady_clock::time_point heard_ = std::chrono::steady_clock::now();
 };
 

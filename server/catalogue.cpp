@@ -35,6 +35,9 @@ constexpr const char* to_version_3 = R"(
   CREATE INDEX jobs_by_owner ON jobs (owner, state, number);
   PRAGMA user_version = 3;
 )";
+// Request ids of jobs that have been deleted.
+constexpr const char* deleted_table =
+    "CREATE TABLE IF NOT EXISTS deleted (request_id TEXT PRIMARY KEY, job TEXT NOT NULL, seconds INTEGER NOT NULL) WITHOUT ROWID";
 
 // A commit that overwrites its part of the write-ahead log waits for the data alone; one that makes the log longer waits for the
 // file system's journal too, twenty times as long. So the log is made as long as it will be until SQLite begins it anew (1000
@@ -176,6 +179,7 @@ Catalogue::Catalogue(const std::filesystem::path& file) {
     run(database, to_version_3);
     transaction.commit();
   }
+  run(database, deleted_table);
   int keep = 1;  // the log stays as long as it is when the server ends
   sqlite3_file_control(database, nullptr, SQLITE_FCNTL_PERSIST_WAL, &keep);
   std::error_code none;
@@ -189,8 +193,10 @@ Catalogue::~Catalogue() = default;
 
 std::optional<Catalogue::Request> Catalogue::find_request(const std::string& request_id) const {
   Statement row(database_.get(), "SELECT id, content FROM submissions JOIN jobs USING (number) WHERE request_id = ?");
-  if (!row.bind(request_id).step()) return std::nullopt;
-  return Request{row.bytes(0), row.bytes(1)};
+  if (row.bind(request_id).step()) return Request{row.bytes(0), row.bytes(1)};
+  Statement deleted(database_.get(), "SELECT job, seconds FROM deleted WHERE request_id = ?");
+  if (!deleted.bind(request_id).step()) return std::nullopt;
+  return Request{deleted.bytes(0), {}, deleted.number(1)};
 }
 
 void Catalogue::insert(JobRecord& record, const std::string& request_id, const std::string& content) {
@@ -215,8 +221,18 @@ void Catalogue::update(const JobRecord& record) {
   job.bind(record.number).step();
 }
 
-void Catalogue::erase(const std::string& id) {
+void Catalogue::erase(const std::string& id, std::int64_t deleted) {
   Transaction transaction(database_.get());
+  Statement(database_.get(), "DELETE FROM deleted WHERE seconds < ?")
+      .bind(deleted - std::chrono::seconds(remembered).count())
+      .step();
+  Statement(database_.get(),
+            "INSERT OR REPLACE INTO deleted SELECT request_id, ?, ? FROM submissions "
+            "WHERE request_id IS NOT NULL AND number = (SELECT number FROM jobs WHERE id = ?)")
+      .bind(id)
+      .bind(deleted)
+      .bind(id)
+      .step();
   Statement(database_.get(), "DELETE FROM submissions WHERE number = (SELECT number FROM jobs WHERE id = ?)").bind(id).step();
   Statement(database_.get(), "DELETE FROM jobs WHERE id = ?").bind(id).step();
   transaction.commit();

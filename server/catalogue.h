@@ -1,6 +1,7 @@
 // The catalogue of jobs: SQLite, write-ahead log, synchronous=FULL. What is here when a call returns is there after a crash.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -33,14 +34,19 @@ class Catalogue {
 
   struct Request {
     std::string job;
-    std::string content;  // what was asked: a CreateJobRequest, serialized deterministically
+    std::string content;       // what was asked: a CreateJobRequest, serialized deterministically
+    std::int64_t deleted = 0;  // seconds of Unix; 0: the job is there
   };
+  // Of a job that is there, or was deleted less than `remembered` ago: a late retry shall not run it again.
   std::optional<Request> find_request(const std::string& request_id) const;
+  static constexpr std::chrono::hours remembered{30 * 24};
   // Job, with its owner, and what was asked in one transaction; request_id may be empty. Gives the record its number.
   void insert(JobRecord& record, const std::string& request_id, const std::string& content);
   std::string content(const JobRecord& record) const;  // empty: created before content was kept for every job
   void update(const JobRecord& record);
-  void erase(const std::string& id);  // its request ids are forgotten too; nothing if there is no such job
+  // deleted: when, in seconds of Unix; what was deleted longer ago than is remembered is forgotten then. Nothing if there is no
+  // such job.
+  void erase(const std::string& id, std::int64_t deleted);
 
   std::optional<JobRecord> find(const std::string& id) const;
   std::vector<JobRecord> in_states(const std::vector<v1::JobState>& states, std::int64_t most = -1) const;  // oldest first

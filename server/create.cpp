@@ -58,6 +58,14 @@ std::optional<v1::CreateJobResponse> Jobs::earlier_answer(const std::string& own
   if (request.request_id().empty()) return std::nullopt;
   const auto earlier = catalogue_.find_request(request_key(owner, request.request_id()));
   if (!earlier) return std::nullopt;
+  if (earlier->deleted > 0) {
+    const auto days = std::chrono::duration_cast<std::chrono::days>(Catalogue::remembered).count();
+    throw Refusal(Refused::job_deleted,
+                  "request id " + request.request_id() + " made job " + earlier->job +
+                      ", which has been deleted; the id is kept for " + std::to_string(days) +
+                      " days, so that a late retry does not run the job again",
+                  "bedflow submit CASE, with another request id or none");
+  }
   if (earlier->content != content) {
     throw Refusal(
         Refused::request_id_reused,
@@ -125,13 +133,30 @@ v1::CreateJobResponse Jobs::create(const Caller& caller, const v1::CreateJobRequ
   }
   if (!request.has_case_())
     throw Refusal(Refused::bad_request, "the request has neither a case nor start_from", "bedflow init mueller");
-  require_sound(request, settings_.slots);
+  require_sound(request, capacities());
+  *record.job.mutable_spec() = request.spec();
   v1::CreateJobResponse response;
   *response.mutable_plan() = planner_.plan(case_text(request.case_()), request.spec().ranks());
+  keep_plan(record.job, response.plan());
   if (request.validate_only()) return response;
   auto committed = commit(record, request, content);
   *committed.mutable_plan() = response.plan();
   return committed;
+}
+
+// Of the job's specification. What the plan needs must be there when nothing else runs.
+void Jobs::keep_plan(v1::Job& job, const v1::PlanReport& plan) const {
+  job.set_planned_memory_bytes(static_cast<std::uint64_t>(plan.memory_bytes()));
+  job.set_planned_checkpoint_bytes(static_cast<std::uint64_t>(plan.checkpoint_bytes()));
+  if (plan.steps() > 0) job.set_planned_step_seconds(plan.seconds() / static_cast<double>(plan.steps()));
+  const auto memory = capacities().at(job.spec().executor()).memory_bytes;
+  if (memory <= 0 || plan.memory_bytes() <= memory) return;
+  v1::Fault fault;
+  fault.set_path("memory");
+  fault.set_text("needs " + bytes_text(plan.memory_bytes()) + " by its plan; all jobs of the executor " + job.spec().executor() +
+                 " together may have " + bytes_text(memory));
+  throw Refusal(Refused::invalid_case, "the case can never run on this server",
+                settings_.slurm ? "bedflow submit CASE --executor slurm" : "bedflow explain CASE", {fault});
 }
 
 v1::CreateJobResponse Jobs::commit(JobRecord& record, const v1::CreateJobRequest& request, const std::string& content,
@@ -162,6 +187,7 @@ v1::CreateJobResponse Jobs::commit(JobRecord& record, const v1::CreateJobRequest
   require_quota(record.job.owner());
   if (const JobFolder* folder = draft ? &draft->folder : imported) move_into_place(*folder, folder_of(record.job.id()));
   catalogue_.insert(record, request_key(record.job.owner(), request.request_id()), content);
+  if (is_waiting(record.job.state())) queue_.put(record);
   spdlog::info("{} is {}: case {}, {} ranks, of {}", record.job.id(), state_word(record.job.state()),
                printable(record.job.case_name()), request.spec().ranks(), record.job.owner());
   notifier_.poke();

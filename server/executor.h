@@ -1,18 +1,16 @@
-// Starts and ends attempts on this machine. An attempt is a runner in its own session, with the engine's processes below it.
-//
-// The lock of an attempt is taken before the runner exists and handed down to it and to what it starts: a job never has two live
-// attempts, whatever is killed when.
+// What runs the attempts at jobs: this machine (local_executor.h), or a batch system (slurm_executor.h). Whichever it is, an
+// attempt is `bedflowd run-attempt` (runner.h) on the job's folder; the folder tells what the engine does, the executor only
+// whether it is there.
 #pragma once
 
-#include <sys/types.h>
-
+#include <chrono>
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
-#include <utility>
-#include <vector>
 
 #include "folder.h"
+#include "states.h"
 
 namespace bedflow::server {
 
@@ -22,20 +20,45 @@ struct Programs {
   std::string mpirun = "mpirun";
 };
 
-class LocalExecutor {
+// What an attempt is to be.
+struct AttemptOrder {
+  std::uint32_t epoch = 0;
+  std::uint32_t ranks = 1;
+  std::optional<std::uint64_t> from_step;       // the checkpoint to take up; the newest good one if absent
+  std::chrono::duration<double> wall_limit{0};  // none if 0
+  std::chrono::duration<double> step_time{0};   // of one step of the engine, by its plan
+  double memory_bytes = 0;                      // of all ranks together, by the plan; 0: not known
+  double checkpoint_bytes = 0;                  // likewise
+};
+
+// What an executor knows of an attempt.
+struct Sighting {
+  enum class Where {
+    waiting,  // for something that is not the engine's: it need not give signs of life
+    there,
+    gone,  // nothing of it lives, or what does will be fenced off by the next attempt
+  };
+  Where where = Where::there;
+  std::string waits_for;         // waiting: for what
+  std::optional<Ending> ending;  // gone: how, where the executor knows more than the folder
+  std::string batch_job, node;   // of a batch system, where known
+};
+
+class Executor {
  public:
-  explicit LocalExecutor(Programs programs) : programs_(std::move(programs)) {}
+  Executor() = default;
+  virtual ~Executor() = default;
+  Executor(const Executor&) = delete;
+  Executor& operator=(const Executor&) = delete;
 
-  // from_step: the checkpoint to take up; the newest good one if absent. Throws std::runtime_error when an earlier attempt still
-  // lives or the runner cannot be started.
-  void start(const JobFolder& folder, std::uint32_t epoch, std::uint32_t ranks, std::optional<std::uint64_t> from_step);
-  bool is_alive(const JobFolder& folder, std::uint32_t epoch) const;
-  void kill(const JobFolder& folder, std::uint32_t epoch) const;  // SIGKILL to all of the attempt's session
-  void reap();                                                    // children of ours that have ended
-
- private:
-  Programs programs_;
-  std::vector<pid_t> runners_;  // started by this server
+  // Throws std::runtime_error when it cannot be started. Called without any lock; the others never wait.
+  virtual void start(const JobFolder& folder, const AttemptOrder& order) = 0;
+  // silence: since the last sign of life of its engine, or since somebody began to listen.
+  virtual Sighting look(const JobFolder& folder, std::uint32_t epoch, std::chrono::steady_clock::duration silence) = 0;
+  virtual void kill(const JobFolder& folder, std::uint32_t epoch) = 0;
+  virtual void withdraw(const JobFolder& folder, std::uint32_t epoch) = 0;  // if it still waits, it shall not begin
+  virtual void forget(const JobFolder& folder, std::uint32_t epoch) = 0;    // it has ended, and the server knows
+  virtual void tidy() {}                                                    // now and then
 };
 
 }  // namespace bedflow::server

@@ -36,8 +36,11 @@ class JobFolder {
   std::filesystem::path attempts() const { return root_ / "attempts"; }
   std::filesystem::path attempt(std::uint32_t epoch) const { return attempts() / std::to_string(epoch); }
   std::filesystem::path lock(std::uint32_t epoch) const { return attempt(epoch) / "lock"; }
+  std::filesystem::path taken(std::uint32_t epoch) const { return attempt(epoch) / "taken"; }
+  std::filesystem::path batch_script(std::uint32_t epoch) const { return attempt(epoch) / "batch.sh"; }
   std::filesystem::path runner(std::uint32_t epoch) const { return attempt(epoch) / "runner.txtpb"; }
   std::filesystem::path exit_record(std::uint32_t epoch) const { return attempt(epoch) / "exit.txtpb"; }
+  std::filesystem::path output_log(std::uint32_t epoch) const { return attempt(epoch) / "stdout.log"; }
   std::filesystem::path error_log(std::uint32_t epoch) const { return attempt(epoch) / "stderr.log"; }
 
   static std::string checkpoint_name(std::uint64_t step);

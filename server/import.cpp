@@ -180,14 +180,19 @@ v1::Job Jobs::import(const Caller& caller, const v1::ImportCheckpointRequest::He
   if (head.has_request_id()) request.set_request_id(head.request_id());
   if (!read_message(draft.case_file(), *request.mutable_case_()))
     throw Refusal(Refused::invalid_case, "the case that the checkpoint carries cannot be read");
-  if (!head.spec().has_ranks()) request.mutable_spec()->set_ranks(std::min(report.ranks(), settings_.slots));
-  require_sound(request, settings_.slots);
+  if (!head.spec().has_ranks()) {
+    const auto executors = capacities();
+    const auto executor = executors.find(head.spec().executor());
+    request.mutable_spec()->set_ranks(executor == executors.end() ? 1 : std::min(report.ranks(), executor->second.most_ranks));
+  }
+  require_sound(request, capacities());
   JobRecord record;
   record.job.set_owner(caller.owner);
   record.job.set_id(draft.root().filename());
   record.job.set_state(v1::STATE_SUSPENDED);
   record.job.set_message("imported at step " + std::to_string(report.step()) + "; resume it, or start others from it");
-  planner_.plan(case_text(request.case_()), request.spec().ranks());
+  *record.job.mutable_spec() = request.spec();
+  keep_plan(record.job, planner_.plan(case_text(request.case_()), request.spec().ranks()));
   return commit(record, request, "import " + std::to_string(head.bytes()) + " " + std::to_string(crc), &draft).job();
 }
 

@@ -12,6 +12,7 @@
 #include "case_file.h"
 #include "refusal.h"
 #include "security.h"
+#include "submission.h"
 
 namespace bedflow::server {
 namespace {
@@ -65,8 +66,6 @@ v1::Job Jobs::view(const JobRecord& record) const {
   v1::Job job = record.job;
   job.set_folder(folder_of(job.id()).root());
   job.set_retries(record.retries);
-  if (const auto why = waits_for_.find(job.id()); why != waits_for_.end() && is_waiting(job.state()))
-    job.set_waits_for(why->second);
   if (const auto live = live_.find(job.id()); live != live_.end()) {
     add_time_so_far(job);
     if (const auto memory = measured_.memory.find(job.id()); memory != measured_.memory.end())
@@ -75,6 +74,7 @@ v1::Job Jobs::view(const JobRecord& record) const {
     if (attempt.progress().ByteSizeLong() > 0) *job.mutable_progress() = attempt.progress();
     job.set_last_sequence(attempt.last_sequence());
   }
+  if (auto why = waits_for(record); !why.empty()) job.set_waits_for(std::move(why));
   return job;
 }
 
@@ -105,9 +105,17 @@ void Jobs::store(JobRecord& record, v1::JobState state, std::optional<Ending> wh
   catalogue_.update(changed);
   record = changed;
   ++entered_[state];
+  if (is_waiting(state)) {
+    queue_.put(record);
+  } else {
+    queue_.take(record.job.id());
+  }
   spdlog::info("{} is {}{}", record.job.id(), state_word(state), why ? ": " + why->message : "");
   if (const auto watched = feeds_.find(record.job.id()); watched != feeds_.end()) {
-    if (const auto feed = watched->second.lock()) feed->add(view(record));
+    if (const auto feed = watched->second.lock()) {
+      feed->add(view(record));
+      told_[record.job.id()] = {waits_for(record), std::chrono::steady_clock::now()};
+    }
   }
   news_.insert(record.job.id());
   changed_.notify_all();
@@ -190,15 +198,35 @@ v1::Job Jobs::suspend(const Caller& caller, const std::string& id) {
   return request(caller, id, Request::suspend, "suspended", v1::Control::SUSPEND, false);
 }
 
+// The record with what the request changes. Throws Refusal(invalid_case).
+JobRecord Jobs::changed_by(const v1::ResumeJobRequest& request, JobRecord record) const {
+  auto& spec = *record.job.mutable_spec();
+  if (request.ranks() > 0) spec.set_ranks(request.ranks());
+  if (request.has_wall_limit_seconds()) spec.set_wall_limit_seconds(request.wall_limit_seconds());
+  if (request.has_priority()) spec.set_priority(request.priority());
+  if (auto faults = check_spec(spec, capacities()); !faults.empty())
+    throw Refusal(Refused::invalid_case, "job " + request.id() + " cannot be resumed so", "bedflow server info",
+                  std::move(faults));
+  return record;
+}
+
 v1::Job Jobs::resume(const Caller& caller, const v1::ResumeJobRequest& request) {
+  std::optional<v1::PlanReport> plan;  // on other ranks another one; made without the lock
+  if (request.ranks() > 0) {
+    std::string text;
+    {
+      const std::lock_guard guard(mutex_);
+      JobRecord found = own_record(caller, request.id());
+      changed_by(request, require(found, Request::resume, "resumed"));
+      text = case_text(case_of(found));
+    }
+    plan = planner_.plan(text, request.ranks());
+  }
   const std::lock_guard guard(mutex_);
   JobRecord record = own_record(caller, request.id());
-  require(record, Request::resume, "resumed");
+  record = changed_by(request, require(record, Request::resume, "resumed"));
+  if (plan) keep_plan(record.job, *plan);
   const auto folder = folder_of(request.id());
-  if (request.ranks() > settings_.slots) {
-    throw Refusal(Refused::bad_request, "ranks is " + std::to_string(request.ranks()) + "; this server has " +
-                                            std::to_string(settings_.slots) + " slots");
-  }
   if (request.has_step()) {
     record.from_step = existing_step(folder, request.id(), request.step());
     // What is newer belongs to a history that the user has left: a later retry must not fall back to it.
@@ -207,7 +235,6 @@ v1::Job Jobs::resume(const Caller& caller, const v1::ResumeJobRequest& request) 
       if (step > request.step()) fs::rename(path, path + ".superseded-" + std::to_string(record.job.epoch()));
     }
   }
-  if (request.ranks() > 0) record.job.mutable_spec()->set_ranks(request.ranks());
   record.retries = 0;
   store(record, v1::PENDING);
   return view(record);
@@ -256,29 +283,28 @@ Cursor Jobs::watch(const std::string& id, std::uint64_t after, bool from_now) {
     throw Refusal(Refused::bad_request, "after_sequence is " + std::to_string(after) + "; the newest event of " + id + " is " +
                                             std::to_string(job.last_sequence()));
   }
+  told_.try_emplace(id, Told{job.waits_for(), std::chrono::steady_clock::now()});
   return {folder_of(id).events(), job, feed_of(job), from_now ? job.last_sequence() : after};
 }
 
 v1::ServerInfo Jobs::info() {
   v1::ServerInfo info;
   info.set_version(BEDFLOW_VERSION);
-  info.add_executors("local");
   info.set_slots(settings_.slots);
   std::error_code failed;
   if (const auto space = fs::space(settings_.data, failed); !failed) info.set_disk_free_bytes(space.available);
   for (auto& law : built_laws()) info.add_built_laws(std::move(law));
   const std::lock_guard guard(mutex_);
-  std::uint32_t ranks = 0;
-  for (const auto& [id, live] : live_) ranks += live.record.job.spec().ranks();
-  info.set_ranks_in_use(ranks);
+  info.set_ranks_in_use(uses()["local"].ranks);
   info.set_jobs_running(static_cast<std::uint32_t>(live_.size()));
-  info.set_jobs_pending(static_cast<std::uint32_t>(catalogue_.count({v1::PENDING, v1::RECOVERING})));
+  info.set_jobs_pending(static_cast<std::uint32_t>(queue_.size()));
+  add_queue(info);
   return info;
 }
 
 bool Jobs::is_idle() {
   const std::lock_guard guard(mutex_);
-  return live_.empty() && catalogue_.count({v1::PENDING, v1::RECOVERING}) == 0;
+  return live_.empty() && queue_.size() == 0;
 }
 
 void Jobs::stop_waiting() {

@@ -1,7 +1,8 @@
 // The jobs of a server: every change of state passes here. Calls come from any thread (jobs.cpp, create.cpp); one thread advances
 // the attempts and the queue (supervise.cpp). The catalogue says what a job is, its folder what its engine does.
 //
-// The queue is first come, first served: the oldest waiting job starts as soon as its ranks fit into the free slots.
+// Waiting jobs start in the order of queue.h, as soon as slots and memory are free, or at once on an executor that queues by
+// itself.
 #pragma once
 
 #include <chrono>
@@ -21,7 +22,9 @@
 #include "folder.h"
 #include "follow.h"
 #include "planner.h"
+#include "queue.h"
 #include "quota.h"
+#include "slurm.h"
 #include "states.h"
 
 namespace bedflow::server {
@@ -29,7 +32,9 @@ namespace bedflow::server {
 struct Settings {
   std::filesystem::path data;  // catalogue.sqlite, jobs/<id>/
   Programs programs;
-  std::uint32_t slots = 4;  // ranks that may run at once
+  std::uint32_t slots = 4;                  // ranks that may run at once on this machine
+  double memory_bytes = 0;                  // that their plans may have together; 0: not counted
+  std::optional<SlurmSettings> slurm = {};  // no such executor if absent
   std::chrono::seconds heartbeat_limit{30};
   Quotas quotas;
   std::uint64_t disk_reserve = 0;  // bytes; no job starts while less is free
@@ -107,6 +112,7 @@ class Jobs {
     bool heartbeat_lost = false;
     std::optional<Ending> start_failure = {};                              // its runner could not be started
     std::optional<std::chrono::steady_clock::time_point> stopped_at = {};  // when the engine said so
+    std::string waits_for = {};                                            // what its executor says
   };
 
   JobFolder folder_of(const std::string& id) const { return JobFolder(settings_.data / "jobs" / id); }
@@ -119,12 +125,14 @@ class Jobs {
   void tell(JobRecord record, const std::string& text);
   void store(JobRecord& record, v1::JobState state, std::optional<Ending> why = std::nullopt);
   JobRecord& require(JobRecord& record, Request request, const char* wanted) const;
+  JobRecord changed_by(const v1::ResumeJobRequest& request, JobRecord record) const;
   v1::Job request(const Caller& caller, const std::string& id, Request request, const char* wanted, v1::Control::Command command,
                   bool skip_checkpoint);
 
   std::optional<v1::CreateJobResponse> earlier_answer(const std::string& owner, const v1::CreateJobRequest& request,
                                                       const std::string& content) const;
   void start_from(v1::CreateJobRequest& request, JobRecord& record) const;
+  void keep_plan(v1::Job& job, const v1::PlanReport& plan) const;  // throws Refusal(invalid_case) when it can never run
   // The record has its owner. imported: a draft's folder with a checkpoint; the record then has its id and state already.
   v1::CreateJobResponse commit(JobRecord& record, const v1::CreateJobRequest& request, const std::string& content,
                                const JobFolder* imported = nullptr);
@@ -133,17 +141,27 @@ class Jobs {
 
   void finish_removals();
   void adopt();
-  void look_at(Live& live);
-  void end(Live& live);
-  void store_end(JobRecord& record, Ending ending, bool is_nobodys_fault);
+  void add_executors();
+  Executor& executor_of(const JobRecord& record);
+  void look_at(Live& live, const Sighting& sighting);
+  void take_sighting(Live& live, const Sighting& sighting);
+  void end(Live& live, const Sighting& sighting);
+  void store_end(JobRecord& record, Ending ending, bool is_nobodys_fault, bool has_gone_on);
   std::optional<JobRecord> next_to_start();
   std::uint64_t running(const std::string& owner) const;  // empty: of all
   Holding holding(const std::string& owner) const;        // empty: of all
   void require_quota(const std::string& owner) const;
-  std::string why_not_start(const v1::Job& job) const;
+  std::string why_not_start(const std::string& owner) const;
   static void count_time(JobRecord& record, std::int64_t until);  // of the attempt that ended then
   static void add_time_so_far(v1::Job& job);                      // of the attempt that runs
   void start(JobRecord record, std::unique_lock<std::mutex>& guard);
+
+  // The queue and what it is measured by (queueing.cpp).
+  Capacities capacities() const;
+  std::map<std::string, Use> uses() const;
+  std::string waits_for(const JobRecord& record) const;
+  void tell_waiting();
+  void add_queue(v1::ServerInfo& info);
 
   Settings settings_;
   Planner planner_;
@@ -151,11 +169,17 @@ class Jobs {
   std::mutex mutex_;  // over all below
   std::condition_variable changed_;
   Catalogue catalogue_;
-  LocalExecutor executor_;
+  Queue queue_;
+  std::map<std::string, std::unique_ptr<Executor>> executors_;  // by name
+  std::unique_ptr<Executor> absent_;                            // for those that are not there
   std::map<std::string, Live> live_;
+  struct Told {
+    std::string waits_for;
+    std::chrono::steady_clock::time_point at;
+  };
+  std::map<std::string, Told> told_;                  // to watchers, of jobs that wait
   std::map<std::string, std::weak_ptr<Feed>> feeds_;  // of jobs that are watched
   std::set<std::string> news_;
-  std::map<std::string, std::string> waits_for_;  // jobs that may not start, and why
   std::map<v1::JobState, std::uint64_t> entered_;
   std::map<v1::StopReason, std::uint64_t> failures_;
   MeasuredUse measured_;

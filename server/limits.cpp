@@ -45,7 +45,7 @@ void Jobs::require_quota(const std::string& owner) const {
   require_room(settings_.quotas.all(), holding(""), everybody);
 }
 
-std::string Jobs::why_not_start(const v1::Job& job) const {
+std::string Jobs::why_not_start(const std::string& owner) const {
   if (settings_.disk_reserve > 0) {
     const auto free = free_bytes(settings_.data);
     if (free < settings_.disk_reserve)
@@ -53,7 +53,7 @@ std::string Jobs::why_not_start(const v1::Job& job) const {
              text_of_bytes(settings_.disk_reserve);
   }
   if (!settings_.quotas.any()) return {};
-  const auto why = why_not_run(settings_.quotas.of(job.owner()), running(job.owner()), "owner " + job.owner());
+  const auto why = why_not_run(settings_.quotas.of(owner), running(owner), "owner " + owner);
   return why.empty() ? why_not_run(settings_.quotas.all(), running(""), everybody) : why;
 }
 

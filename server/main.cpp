@@ -19,6 +19,7 @@
 #include <thread>
 
 #include "backup.h"
+#include "executor_flags.h"
 #include "housekeeping.h"
 #include "jobs.h"
 #include "listen.h"
@@ -39,6 +40,7 @@ using namespace std::chrono_literals;
 
 struct Options {
   Settings settings;
+  ExecutorFlags executors;
   Listening listening;
   OperatingOptions operating;
   bool idle_exit = false;
@@ -174,7 +176,6 @@ fs::path own_path() {
 
 void add_server_options(CLI::App& app, Options& options) {
   Settings& settings = options.settings;
-  settings.slots = std::max(4U, std::thread::hardware_concurrency());
   settings.programs.server = own_path();
   settings.programs.engine = own_path().parent_path() / "bedflow-engine";
   options.reader.program = own_path().parent_path() / "bedflow-reader";
@@ -189,7 +190,6 @@ void add_server_options(CLI::App& app, Options& options) {
   app.add_option("--tls-key", listening.tls.key, "its private key, PEM")->type_name("FILE");
   app.add_option("--client-ca", listening.tls.client_ca, "clients need certificates of this authority too, PEM")
       ->type_name("FILE");
-  app.add_option("--slots", settings.slots, "ranks that may run at once")->capture_default_str()->check(CLI::Range(1, 100'000));
   app.add_option("--engine", settings.programs.engine, "the engine")->capture_default_str();
   app.add_option("--reader", options.reader.program, "opens checkpoints")->capture_default_str();
   app.add_option("--reader-memory-mib", options.reader.memory_mib, "memory that one question about a checkpoint may take, MiB")
@@ -207,6 +207,7 @@ void add_server_options(CLI::App& app, Options& options) {
   app.add_option("--heartbeat-seconds", options.heartbeat_seconds, "silence of an engine after which it is given up, s")
       ->capture_default_str()
       ->check(CLI::Range(1.0, 3600.0));
+  add_executor_flags(app, options.executors, settings);
 }
 
 struct BackupOptions {
@@ -236,6 +237,8 @@ CLI::App* add_runner(CLI::App& app, RunnerOptions& runner) {
   command->add_option("--mpirun", runner.mpirun);
   command->add_option("--ranks", runner.ranks)->check(CLI::Range(1, 100'000));
   command->add_option("--from", runner.from_step);
+  command->add_option("--launcher", runner.launcher);
+  command->add_option("--batch-job", runner.batch_job);
   command->add_option("--lock-descriptor", runner.lock_descriptor);
   return command;
 }
@@ -261,6 +264,7 @@ int run(int argc, char** argv) {
   if (options.settings.data.empty())
     throw std::invalid_argument("--data is missing: the folder of the jobs, e.g. --data ./bedflow-data");
   options.settings.data = fs::absolute(options.settings.data).lexically_normal();
+  take_executor_flags(options.executors, options.settings);
   options.reader.time = std::chrono::seconds(options.reader_seconds);
   options.settings.heartbeat_limit = std::chrono::seconds(static_cast<int>(options.heartbeat_seconds));
   serve(options);

@@ -24,6 +24,7 @@ enum class Refused {
   scope_too_small,       // the caller's token does not go so far
   token_not_found,       //
   token_ended,           // it expired or was revoked while the call went on
+  job_deleted,           // the job that the request id made
   timed_out,             // not within the time given
   checkpoint_corrupt,    //
   checkpoint_changed,    // it is not the one that a download began with

@@ -40,9 +40,8 @@ std::uint64_t Jobs::remove(const Caller& caller, const std::string& id) {
       sync_folder(removed.parent_path());
       sync_folder(folder_of(id).root().parent_path());
     }
-    catalogue_.erase(id);
+    catalogue_.erase(id, now_nanos() / 1'000'000'000);
     feeds_.erase(id);
-    waits_for_.erase(id);
   }
   const std::uint64_t freed = bytes_freed(removed);
   fs::remove_all(removed);
@@ -53,7 +52,7 @@ std::uint64_t Jobs::remove(const Caller& caller, const std::string& id) {
 void Jobs::finish_removals() {
   std::error_code none;
   for (const auto& entry : fs::directory_iterator(settings_.data / "removed", none)) {
-    catalogue_.erase(entry.path().filename());
+    catalogue_.erase(entry.path().filename(), now_nanos() / 1'000'000'000);
     fs::remove_all(entry.path());
   }
 }

@@ -45,6 +45,8 @@ Code code_of(Refused why) {
       return {grpc::StatusCode::NOT_FOUND, "TOKEN_NOT_FOUND"};
     case Refused::token_ended:
       return {grpc::StatusCode::UNAUTHENTICATED, "TOKEN_ENDED"};
+    case Refused::job_deleted:
+      return {grpc::StatusCode::ALREADY_EXISTS, "JOB_DELETED"};
     case Refused::timed_out:
       return {grpc::StatusCode::DEADLINE_EXCEEDED, "TIMED_OUT"};
     case Refused::checkpoint_corrupt:

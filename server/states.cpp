@@ -37,8 +37,9 @@ v1::JobState after_attempt(v1::JobState now, v1::StopReason reason, bool may_ret
   if (reason == v1::FINISHED) return v1::SUCCEEDED;
   if (reason == v1::CANCELLED) return v1::STATE_CANCELLED;
   if (reason == v1::SUSPENDED) return now == v1::CANCELLING ? v1::STATE_CANCELLED : v1::STATE_SUSPENDED;
-  if (now == v1::CANCELLING) return v1::STATE_CANCELLED;    // it was to end, and it has
-  if (reason == v1::DISK_FULL) return v1::STATE_SUSPENDED;  // resumed by a user who has made room
+  if (now == v1::CANCELLING) return v1::STATE_CANCELLED;                              // it was to end, and it has
+  if (reason == v1::DISK_FULL) return v1::STATE_SUSPENDED;                            // resumed by a user who has made room
+  if (reason == v1::WALL_LIMIT && now == v1::SUSPENDING) return v1::STATE_SUSPENDED;  // there is a checkpoint, as was asked
   if (!is_worth_a_retry(reason)) return v1::FAILED;
   if (now == v1::SUSPENDING) return v1::STATE_SUSPENDED;  // resumes from the newest checkpoint
   return may_retry ? v1::RECOVERING : v1::FAILED;

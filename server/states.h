@@ -2,11 +2,20 @@
 //
 //   PENDING → STARTING → RUNNING → SUCCEEDED        SUSPENDING → SUSPENDED → PENDING      CANCELLING → CANCELLED
 //   STARTING, RUNNING → RECOVERING → STARTING       FAILED → PENDING (resumed by a user)
+//   RUNNING → PENDING (its wall limit is over, and it goes on when its turn comes again)
 #pragma once
+
+#include <string>
 
 #include "bedflow/v1/job.pb.h"
 
 namespace bedflow::server {
+
+// How an attempt ended.
+struct Ending {
+  v1::StopReason reason;
+  std::string message;
+};
 
 enum class Request { cancel, suspend, resume, checkpoint };
 

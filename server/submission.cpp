@@ -1,5 +1,6 @@
 #include "submission.h"
 
+#include <algorithm>
 #include <cmath>
 #include <sstream>
 
@@ -21,7 +22,8 @@ class Faults {
   void number(const std::string& path, bool present, double value, double low, double high, const char* unit) {
     if (!present || (std::isfinite(value) && value >= low && value <= high)) return;
     std::ostringstream text;
-    text << "is " << value << " " << unit << "; allowed are " << low << " to " << high << " " << unit;
+    const std::string of = *unit == 0 ? "" : std::string(" ") + unit;
+    text << "is " << value << of << "; allowed are " << low << " to " << high << of;
     add(path, text.str());
   }
   std::vector<v1::Fault> list() && { return std::move(list_); }
@@ -32,10 +34,19 @@ class Faults {
 
 }  // namespace
 
-std::vector<v1::Fault> check_spec(const v1::JobSpec& spec, std::uint32_t slots) {
+std::vector<v1::Fault> check_spec(const v1::JobSpec& spec, const Capacities& executors) {
   Faults faults;
-  faults.number("spec.ranks", true, spec.ranks(), 1, slots, "ranks (the server's slots)");
-  if (spec.executor() != "local") faults.add("spec.executor", "is '" + printable(spec.executor()) + "'; this server has: local");
+  std::string names;
+  std::uint32_t most_ranks = 0;
+  for (const auto& [name, capacity] : executors) {
+    names += (names.empty() ? "" : ", ") + name;
+    if (name == spec.executor() || !executors.contains(spec.executor())) most_ranks = std::max(most_ranks, capacity.most_ranks);
+  }
+  faults.number("spec.ranks", true, spec.ranks(), 1, most_ranks,
+                spec.executor() == "local" ? "ranks (the server's slots)" : "ranks (of one job)");
+  if (!executors.contains(spec.executor()))
+    faults.add("spec.executor", "is '" + printable(spec.executor()) + "'; this server has: " + names);
+  faults.number("spec.priority", spec.has_priority(), spec.priority(), -1000, 1000, "");
   faults.number("spec.wall_limit_seconds", spec.has_wall_limit_seconds(), spec.wall_limit_seconds(), 0, 1e9, "s");
   faults.number("spec.retries.most", true, spec.retries().most(), 0, 100, "retries");
   const auto& policy = spec.checkpoints();
@@ -72,9 +83,9 @@ std::vector<v1::Fault> check_case_fields(const v1::Case& value) {
   return std::move(faults).list();
 }
 
-void require_sound(const v1::CreateJobRequest& request, std::uint32_t slots) {
+void require_sound(const v1::CreateJobRequest& request, const Capacities& executors) {
   auto faults = check_case_fields(request.case_());
-  for (auto& fault : check_spec(request.spec(), slots)) faults.push_back(std::move(fault));
+  for (auto& fault : check_spec(request.spec(), executors)) faults.push_back(std::move(fault));
   if (faults.empty()) return;
   const std::string count = std::to_string(faults.size()) + (faults.size() == 1 ? " fault" : " faults");
   throw Refusal(Refused::invalid_case, count + " in the case", "bedflow validate CASE", std::move(faults));

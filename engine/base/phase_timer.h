@@ -1,10 +1,13 @@
-// Wall seconds per phase of a step. Exclusive: a phase entered inside another stops the outer one's clock.
+// Wall seconds per phase of a step. Exclusive: a phase entered inside another stops the outer one's clock. The clock that is read
+// at every change of phase, several times a sub-step, also tells when a sign of life is due.
 #pragma once
 
 #include <array>
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <string_view>
+#include <utility>
 
 namespace bedflow {
 
@@ -56,7 +59,16 @@ class PhaseTimer {
   };
 
   const Total& operator[](Phase phase) const { return totals_[static_cast<int>(phase)]; }
-  // Seconds since construction, all phases together.
+  void restart() {
+    totals_ = {};
+    start_ = since_ = Clock::now();
+  }
+  // Called about twice a second from now on, at a change of phase: while the ranks advance, and not while they do not.
+  void set_pulse(std::function<void()> pulse) {
+    pulse_ = std::move(pulse);
+    next_pulse_ = Clock::now();
+  }
+  // Seconds since construction or the last restart, all phases together.
   double seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
 
  private:
@@ -66,12 +78,19 @@ class PhaseTimer {
     totals_[static_cast<int>(current_)].seconds += std::chrono::duration<double>(now - since_).count();
     since_ = now;
     current_ = next;
+    if (now >= next_pulse_) give_pulse(now);
+  }
+  void give_pulse(Clock::time_point now) {
+    next_pulse_ = now + std::chrono::milliseconds(500);
+    pulse_();
   }
 
   std::array<Total, phase_count> totals_{};
   Clock::time_point start_ = Clock::now();
   Clock::time_point since_ = start_;
   Phase current_ = Phase::other;
+  Clock::time_point next_pulse_ = Clock::time_point::max();
+  std::function<void()> pulse_;
 };
 
 }  // namespace bedflow

@@ -20,6 +20,7 @@ enum class Reason {
   wall_limit = 18,
   checkpoint_corrupt = 20,
   stale_epoch = 22,
+  folder_removed = 23,
   internal = 70,
 };
 

@@ -124,7 +124,7 @@ CheckpointInfo write_checkpoint(const Comm& comm, const fs::path& folder_given, 
     std::string text;
     do_alike(comm, [&] {
       if (!comm.root()) return;
-      fs::create_directories(folder);
+      fs::create_directory(folder);  // not the job's folder, should somebody have removed it
       manifest = layout.create(partial, seal);
       text = manifest.text();
     });

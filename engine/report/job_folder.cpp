@@ -30,7 +30,9 @@ static_assert(static_cast<int>(Reason::finished) == v1::FINISHED && static_cast<
               static_cast<int>(Reason::out_of_memory) == v1::OUT_OF_MEMORY &&
               static_cast<int>(Reason::disk_full) == v1::DISK_FULL && static_cast<int>(Reason::wall_limit) == v1::WALL_LIMIT &&
               static_cast<int>(Reason::checkpoint_corrupt) == v1::CHECKPOINT_CORRUPT &&
-              static_cast<int>(Reason::stale_epoch) == v1::STALE_EPOCH && static_cast<int>(Reason::internal) == v1::INTERNAL);
+              static_cast<int>(Reason::stale_epoch) == v1::STALE_EPOCH &&
+              static_cast<int>(Reason::folder_removed) == v1::FOLDER_REMOVED &&
+              static_cast<int>(Reason::internal) == v1::INTERNAL);
 
 namespace {
 
@@ -113,7 +115,10 @@ struct JobFolder::Logs {
 };
 
 JobFolder::JobFolder(const Comm& comm, std::filesystem::path folder, std::uint32_t epoch, bool go_on_when_full)
-    : path_(std::move(folder)), epoch_(epoch), go_on_when_full_(go_on_when_full) {
+    : path_(std::move(folder)),
+      epoch_(epoch),
+      go_on_when_full_(go_on_when_full),
+      heartbeat_(comm.root(), path_ / "heartbeat", epoch) {
   if (!comm.root()) return;
   try {
     logs_ = std::make_unique<Logs>(path_);
@@ -166,6 +171,12 @@ bool JobFolder::has_unwritten() const {
 
 void JobFolder::leave() {
   logs_.reset();
+  heartbeat_.leave();
+}
+
+bool JobFolder::is_removed() const {
+  struct stat file {};
+  return logs_ && stat((path_ / "events.log").c_str(), &file) != 0 && (errno == ENOENT || errno == ENOTDIR);
 }
 
 void JobFolder::started(int ranks, std::uint64_t step, double time, double end_time, const std::string& from_checkpoint,
@@ -294,11 +305,7 @@ Command JobFolder::poll() {
   const auto now = std::chrono::steady_clock::now();
   if (!logs_ || now - last_poll_ < std::chrono::milliseconds(100)) return Command::none;
   last_poll_ = now;
-  const int heartbeat = open((path_ / "heartbeat").c_str(), O_WRONLY | O_CREAT, 0644);
-  if (heartbeat >= 0) {
-    futimens(heartbeat, nullptr);
-    close(heartbeat);
-  }
+  heartbeat_.beat();
   // Taken by renaming, so that a command is obeyed once and a newer one is never lost.
   const std::filesystem::path taken = path_ / "control.obeyed.txtpb";
   std::error_code none;
@@ -317,6 +324,8 @@ Command JobFolder::poll() {
       return Command::suspend;
     case v1::Control::CANCEL:
       return control.skip_checkpoint() ? Command::cancel_now : Command::cancel;
+    case v1::Control::LIMIT:
+      return Command::limit;
     default:
       return Command::none;
   }

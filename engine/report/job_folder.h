@@ -13,6 +13,7 @@
 
 #include "base/stop.h"
 #include "parallel/comm.h"
+#include "report/heartbeat.h"
 
 namespace bedflow {
 
@@ -37,7 +38,7 @@ RunPolicy read_policy(const std::filesystem::path& folder);
 // How many checkpoints the folder's events tell of since the last that stays.
 std::uint64_t checkpoints_since_kept(const std::filesystem::path& folder);
 
-enum class Command { none, checkpoint, suspend, cancel, cancel_now };  // cancel_now: without a checkpoint
+enum class Command { none, checkpoint, suspend, cancel, cancel_now, limit };  // cancel_now: without a checkpoint
 
 struct ProgressReport {
   std::uint64_t step = 0;
@@ -90,10 +91,12 @@ class JobFolder {
   void bin(std::size_t monitor, int bin, std::uint64_t step, std::span<const double> mean, std::span<const double> deviation);
   void sync();                 // both logs to the disk: before a checkpoint is told of
   bool has_unwritten() const;  // something waits for room on the disk
-  void leave();                // writes nothing any more: the folder is another attempt's
+  void leave();                // writes nothing any more: the folder is another attempt's, or is no more
+  bool is_removed() const;     // somebody has removed it, or renamed it away
 
-  // Touches the heartbeat and takes control.txtpb (renames it to control.obeyed.txtpb), at most every 100 ms.
+  // Beats and takes control.txtpb (renames it to control.obeyed.txtpb), at most every 100 ms.
   Command poll();
+  Heartbeat& heartbeat() { return heartbeat_; }
 
   const Failure& failure() const { return failure_; }
 
@@ -108,6 +111,7 @@ class JobFolder {
   std::filesystem::path path_;
   std::uint32_t epoch_;
   bool go_on_when_full_;
+  Heartbeat heartbeat_;
   std::unique_ptr<Logs> logs_;  // rank 0 only
   Failure failure_;
   std::chrono::steady_clock::time_point last_poll_{};

@@ -4,7 +4,8 @@
 //   die_after=N   kill -9 itself after N steps
 //   diverge_at=S  stop with DIVERGED             freeze_at=S   live on without heartbeat or steps
 //   epoch=N       the mishap happens in attempt N only        refuse=PATH   the plan finds a fault there
-//   plan=dies     kill -9 itself over the plan
+//   plan=dies     kill -9 itself over the plan     memory_mib=N   the plan says that it needs so much
+//   slow_at=S     live on at step S for slow_ms, with signs of life and nothing else
 // It tells by itself when another one runs in the same folder: "doubled" is there then.
 // A checkpoint's content is "good <step>"; anything else is corrupt.
 #include <fcntl.h>
@@ -79,9 +80,13 @@ class Engine {
     while (step_ < steps) {
       std::this_thread::sleep_for(std::chrono::milliseconds(std::stoi(option(scene_, "step_ms", "1"))));
       ++step_;
+      if (is_replaced()) return v1::STALE_EPOCH;
       if (const auto reason = mishap()) return stop(*reason, "as the case asked");
       report();
-      const auto every = spec_.checkpoints().every_steps();
+      const auto& policy = spec_.checkpoints();
+      const auto every = policy.has_every_simulated_seconds()
+                             ? static_cast<std::uint64_t>(std::lround(policy.every_simulated_seconds() / dt()))
+                             : policy.every_steps();
       if (every > 0 && step_ % every == 0) write_checkpoint();
       if (const auto reason = obey()) return stop(*reason, "as asked");
     }
@@ -95,6 +100,8 @@ class Engine {
     const int lock = ::open((folder_ / "engine.lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
     return ::flock(lock, LOCK_EX | LOCK_NB) == 0;
   }
+  bool is_replaced() const { return fs::exists(folder_ / "attempts" / std::to_string(epoch_ + 1)); }
+  void beat() { std::ofstream(folder_ / "heartbeat") << epoch_ << " " << ++beats_ << "\n"; }
   double dt() const { return scene_.time().step() > 0 ? scene_.time().step() : 0.01; }
   double time() const { return static_cast<double>(step_) * dt(); }
   fs::path checkpoint(std::uint64_t step) const {
@@ -128,7 +135,7 @@ class Engine {
   }
 
   void begin(double end) {
-    std::ofstream(folder_ / "heartbeat").close();
+    beat();
     v1::Event event;
     event.mutable_started()->set_ranks(spec_.ranks());
     event.mutable_started()->set_step(step_);
@@ -148,7 +155,7 @@ class Engine {
   }
 
   void report() {
-    fs::last_write_time(folder_ / "heartbeat", fs::file_time_type::clock::now());
+    beat();
     v1::Event event;
     event.mutable_progress()->set_step(step_);
     event.mutable_progress()->set_time(time());
@@ -180,6 +187,10 @@ class Engine {
     if (due("die_at")) ::kill(::getpid(), SIGKILL);
     if (option(scene_, "die_after", "") == std::to_string(step_ - started_at_)) ::kill(::getpid(), SIGKILL);
     while (due("freeze_at")) std::this_thread::sleep_for(std::chrono::seconds(1));
+    if (due("slow_at")) {
+      const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(std::stoi(option(scene_, "slow_ms", "1000")));
+      for (; std::chrono::steady_clock::now() < end; std::this_thread::sleep_for(std::chrono::milliseconds(100))) beat();
+    }
     return due("diverge_at") ? std::optional(v1::DIVERGED) : std::nullopt;
   }
 
@@ -191,6 +202,7 @@ class Engine {
     if (!control.skip_checkpoint()) write_checkpoint();
     if (control.command() == v1::Control::SUSPEND) return v1::SUSPENDED;
     if (control.command() == v1::Control::CANCEL) return v1::CANCELLED;
+    if (control.command() == v1::Control::LIMIT) return v1::WALL_LIMIT;
     return std::nullopt;
   }
 
@@ -211,7 +223,7 @@ class Engine {
   bedflow::LogWriter statistics_;
   std::optional<std::uint64_t> from_;
   std::uint64_t step_ = 0, started_at_ = 0;
-  std::uint64_t obeyed_ = 0;
+  std::uint64_t obeyed_ = 0, beats_ = 0;
 };
 
 // As `bedflow-engine --plans` (engine/report/plan_report.h).
@@ -222,6 +234,7 @@ std::pair<int, std::string> plan(const v1::Case& scene) {
   if (option(scene, "plan", "") == "dies") ::kill(::getpid(), SIGKILL);
   v1::PlanReport report;
   report.set_steps(static_cast<std::uint64_t>(scene.time().end() / scene.time().step()));
+  report.set_memory_bytes(std::stod(option(scene, "memory_mib", "0")) * (1 << 20));
   report.set_text("a plan of " + scene.name());
   std::string text;
   google::protobuf::TextFormat::PrintToString(report, &text);
@@ -265,7 +278,9 @@ int main(int argc, char** argv) {
   if (words.at(0) == "--plans") return answer_plans();
   if (const auto file = value("--snapshot")) return snapshot(*file);
   // Under mpirun the other ranks only have to be there.
-  if (const char* rank = std::getenv("OMPI_COMM_WORLD_RANK"); rank && std::string(rank) != "0") return 0;
+  for (const char* name : {"OMPI_COMM_WORLD_RANK", "SLURM_PROCID"}) {
+    if (const char* rank = std::getenv(name); rank && std::string(rank) != "0") return 0;
+  }
   const auto from = value("--from");
   Engine engine(words.at(0), static_cast<std::uint32_t>(std::stoul(value("--epoch").value_or("1"))),
                 from ? std::optional<std::uint64_t>(std::stoull(*from)) : std::nullopt);

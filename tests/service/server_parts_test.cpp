@@ -138,6 +138,30 @@ TEST(Catalogue, KeepsJobsAndRequestsOverAReopening) {
   EXPECT_FALSE(again.find_request("request-2"));
 }
 
+TEST(Catalogue, TheRequestIdOfADeletedJobIsRememberedForThirtyDays) {
+  const TemporaryFolder folder;
+  JobRecord record, other;
+  record.job.set_id("j-000000000001");
+  other.job.set_id("j-000000000002");
+  constexpr std::int64_t deleted = 1'000'000, month = 30 * 86'400;
+  {
+    Catalogue catalogue(folder.path() / "c");
+    catalogue.insert(record, "request-1", "a");
+    catalogue.insert(other, "request-2", "b");
+    catalogue.erase("j-000000000001", deleted);
+  }
+  Catalogue catalogue(folder.path() / "c");
+  ASSERT_TRUE(catalogue.find_request("request-1"));
+  EXPECT_EQ(catalogue.find_request("request-1")->job, "j-000000000001");
+  EXPECT_EQ(catalogue.find_request("request-1")->deleted, deleted);
+  EXPECT_FALSE(catalogue.find("j-000000000001"));
+  catalogue.erase("j-000000000003", deleted + month);  // no such job
+  EXPECT_TRUE(catalogue.find_request("request-1"));
+  catalogue.erase("j-000000000002", deleted + month + 1);
+  EXPECT_FALSE(catalogue.find_request("request-1"));
+  EXPECT_TRUE(catalogue.find_request("request-2"));
+}
+
 TEST(Catalogue, ARequestIdThatIsTakenLeavesNoJobBehind) {
   const TemporaryFolder folder;
   Catalogue catalogue(folder.path() / "c");
@@ -224,11 +248,13 @@ TEST(Submission, TheSpecificationsFaultsAreAllNamed) {
   spec.mutable_checkpoints()->set_every_wall_seconds(std::numeric_limits<double>::quiet_NaN());
   (*spec.mutable_labels())["Bad Key"] = "x";
   std::vector<std::string> paths;
-  for (const auto& fault : check_spec(spec, 8)) paths.push_back(fault.path());
+  spec.set_priority(1001);
+  const Capacities executors = {{"local", {8, 8, 0}}};
+  for (const auto& fault : check_spec(spec, executors)) paths.push_back(fault.path());
   EXPECT_THAT(paths,
-              testing::UnorderedElementsAre("spec.ranks", "spec.executor", "spec.wall_limit_seconds", "spec.checkpoints.keep",
+              testing::UnorderedElementsAre("spec.ranks", "spec.executor", "spec.priority", "spec.wall_limit_seconds", "spec.checkpoints.keep",
                                             "spec.checkpoints.every_wall_seconds", "spec.labels"));
-  EXPECT_TRUE(check_spec(v1::JobSpec(), 8).empty());
+  EXPECT_TRUE(check_spec(v1::JobSpec(), executors).empty());
 }
 
 TEST(Refusal, FaultsBeyondWhatHeadersHoldAreCounted) {

@@ -1,4 +1,4 @@
-#include "executor.h"
+#include "local_executor.h"
 
 #include <fcntl.h>
 #include <signal.h>
@@ -45,17 +45,21 @@ std::vector<pid_t> members(const JobFolder& folder, std::uint32_t epoch) {
   return found;
 }
 
+bool is_alive(const JobFolder& folder, std::uint32_t epoch) {
+  return lock_is_held(folder, epoch) || !members(folder, epoch).empty();
+}
+
 }  // namespace
 
-void LocalExecutor::start(const JobFolder& folder, std::uint32_t epoch, std::uint32_t ranks,
-                          std::optional<std::uint64_t> from_step) {
+void LocalExecutor::start(const JobFolder& folder, const AttemptOrder& order) {
+  const auto epoch = order.epoch;
   for (const auto earlier : folder.epochs()) {
     if (is_alive(folder, earlier)) throw std::runtime_error("attempt " + std::to_string(earlier) + " still runs");
   }
   std::filesystem::create_directories(folder.attempt(epoch));
   sync_folder(folder.attempts());
   const File lock(folder.lock(epoch), O_RDWR | O_CREAT);
-  const File output(folder.attempt(epoch) / "stdout.log", O_WRONLY | O_CREAT | O_APPEND);
+  const File output(folder.output_log(epoch), O_WRONLY | O_CREAT | O_APPEND);
   const File error(folder.error_log(epoch), O_WRONLY | O_CREAT | O_APPEND);
   if (lock.number() < 0 || output.number() < 0 || error.number() < 0) {
     throw std::system_error(errno, std::generic_category(), "creating the files of " + folder.attempt(epoch).string());
@@ -64,10 +68,10 @@ void LocalExecutor::start(const JobFolder& folder, std::uint32_t epoch, std::uin
   reserve(folder.runner(epoch));  // a disk that fills up later does not keep the runner from saying how it ended
   reserve(folder.exit_record(epoch));
 
-  std::vector<std::string> command = {programs_.server, "run-attempt",         folder.root(),       std::to_string(epoch),
-                                      "--engine",       programs_.engine,      "--mpirun",          programs_.mpirun,
-                                      "--ranks",        std::to_string(ranks), "--lock-descriptor", "3"};
-  if (from_step) command.insert(command.end(), {"--from", std::to_string(*from_step)});
+  std::vector<std::string> command = {
+      programs_.server, "run-attempt",    folder.root(), std::to_string(epoch),       "--engine",          programs_.engine,
+      "--mpirun",       programs_.mpirun, "--ranks",     std::to_string(order.ranks), "--lock-descriptor", "3"};
+  if (order.from_step) command.insert(command.end(), {"--from", std::to_string(*order.from_step)});
   runners_.push_back(launch({.command = command,
                              .environment = {},
                              .output = output.number(),
@@ -76,15 +80,19 @@ void LocalExecutor::start(const JobFolder& folder, std::uint32_t epoch, std::uin
                              .new_session = true}));
 }
 
-bool LocalExecutor::is_alive(const JobFolder& folder, std::uint32_t epoch) const {
-  return lock_is_held(folder, epoch) || !members(folder, epoch).empty();
+Sighting LocalExecutor::look(const JobFolder& folder, std::uint32_t epoch, std::chrono::steady_clock::duration) {
+  return {.where = is_alive(folder, epoch) ? Sighting::Where::there : Sighting::Where::gone,
+          .waits_for = {},
+          .ending = {},
+          .batch_job = {},
+          .node = {}};
 }
 
-void LocalExecutor::kill(const JobFolder& folder, std::uint32_t epoch) const {
+void LocalExecutor::kill(const JobFolder& folder, std::uint32_t epoch) {
   for (const pid_t member : members(folder, epoch)) ::kill(member, SIGKILL);
 }
 
-void LocalExecutor::reap() {
+void LocalExecutor::tidy() {
   std::erase_if(runners_, [](pid_t runner) { return ::waitpid(runner, nullptr, WNOHANG) == runner; });
 }
 
