@@ -58,9 +58,10 @@ void Studies::advance() {
     const auto before = found->second.study.SerializeAsString();
     try {
       advance(found->second);
-    } catch (const Refusal& refusal) {  // no job can be made of it any more: a quota, a disk, a case that this version refuses
-      if (refusal.why != Refused::disk_full && refusal.why != Refused::too_much)
-        found->second.study.set_state(v1::STUDY_CANCELLED);
+    } catch (const Refusal& refusal) {  // room may come again; a case that this version refuses stays refused
+      const bool may_pass =
+          refusal.why == Refused::disk_full || refusal.why == Refused::too_much || refusal.why == Refused::quota;
+      if (!may_pass) found->second.study.set_state(v1::STUDY_CANCELLED);
       found->second.study.set_message(refusal.what());
     }
     if (found->second.study.SerializeAsString() != before) store(found->second);
