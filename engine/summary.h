@@ -33,9 +33,9 @@ struct RunTotals {
   Traffic traffic;                // of this rank in steps
 };
 
-// Collective; rank 0 writes. Wall and CPU seconds, steps, sub-steps, and seconds and nanoseconds per unit of work of every phase, per
-// rank and in total (the ranks' mean); the share of communication (waiting included) in the steps, and their balance: the work of
-// the busiest rank over the ranks' mean, where work is what is not communication. Throws std::system_error on rank 0.
+// Collective; rank 0 writes. Wall and CPU seconds, steps, sub-steps, and seconds and nanoseconds per unit of work of every phase,
+// per rank and in total (the ranks' mean); the share of communication (waiting included) in the steps, and their balance: the
+// work of the busiest rank over the ranks' mean, where work is what is not communication. Throws std::system_error on rank 0.
 void write_summary(const Comm& comm, const std::filesystem::path& path, const Plan& plan, const PhaseTimer& timer,
                    const RunTotals& totals);
 

@@ -26,8 +26,8 @@ std::string preset_text(std::string_view name);
 // use what is not built yet: check_case tells. An unknown name throws std::out_of_range with the names there are.
 v1::Case ready_case(std::string_view name, std::string_view preset = "");
 
-// Makes `wanted`, an arm of one of the choices of `part`, the one that is chosen. Numbers that it and the arm of before name alike
-// are kept.
+// Makes `wanted`, an arm of one of the choices of `part`, the one that is chosen. Numbers that it and the arm of before name
+// alike are kept.
 void choose_law(google::protobuf::Message& part, const google::protobuf::FieldDescriptor& wanted);
 
 }  // namespace bedflow

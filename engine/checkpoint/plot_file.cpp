@@ -117,7 +117,7 @@ void write_plot(const Comm& comm, const fs::path& folder, const std::string& kin
                 std::uint64_t bytes, Fill fill) {
   do_alike(comm, [&] {
     if (!comm.root()) return;
-    fs::create_directory(folder);  // not the job's folder, should somebody have removed it
+    fs::create_directory(folder);              // not the job's folder, should somebody have removed it
     constexpr std::uint64_t metadata = 65536;  // far more than a plot file's groups and attributes take
     check_room(folder, bytes + metadata);
     const fs::path path = folder / plot_name(kind, step), partial = path.string() + ".partial";

@@ -252,8 +252,8 @@ TEST(Submission, TheSpecificationsFaultsAreAllNamed) {
   const Capacities executors = {{"local", {8, 8, 0}}};
   for (const auto& fault : check_spec(spec, executors)) paths.push_back(fault.path());
   EXPECT_THAT(paths,
-              testing::UnorderedElementsAre("spec.ranks", "spec.executor", "spec.priority", "spec.wall_limit_seconds", "spec.checkpoints.keep",
-                                            "spec.checkpoints.every_wall_seconds", "spec.labels"));
+              testing::UnorderedElementsAre("spec.ranks", "spec.executor", "spec.priority", "spec.wall_limit_seconds",
+                                            "spec.checkpoints.keep", "spec.checkpoints.every_wall_seconds", "spec.labels"));
   EXPECT_TRUE(check_spec(v1::JobSpec(), executors).empty());
 }
 
