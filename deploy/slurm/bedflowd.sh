@@ -4,8 +4,8 @@
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 
-programs=/shared/bedflow/bin  # here and on all nodes the same programs under the same path
-data=/shared/bedflow/data     # on the file system that the nodes share
+programs=/srv/bedflow/bin  # here and on all nodes the same programs under the same path
+data=/srv/bedflow/data     # on the file system that the nodes share
 
 exec "$programs/bedflowd" \
   --data "$data" \
