@@ -118,6 +118,7 @@ TEST_F(Client, EveryVerbThatPrintsDataTakesTableJsonLinesAndCsv) {
                                         "__complete",  // its question
                                         "plot",        // -o names the file
                                         "render",       "checkpoint download",
+                                        "reproduce",     // writes a page
                                         "study cancel",  // say on stderr that it is done
                                         "study delete", "server token revoke", "context add", "context use", "context remove"};
   EXPECT_GT(verbs, 30U);

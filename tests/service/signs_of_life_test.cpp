@@ -32,13 +32,13 @@ class LongStep : public RealEngine {
 };
 
 TEST_F(LongStep, IsNotTakenForDeath) {
-  auto request = bed(1, 0.5);
+  auto request = bed(1, 1.5);
   auto& scene = *request.mutable_case_();
   scene.clear_gas();  // particles alone: as many sub-steps in a step as wished
   scene.clear_coupling();
   scene.mutable_domain()->mutable_faces()->clear_y_low();
   scene.mutable_domain()->mutable_faces()->clear_y_high();
-  scene.mutable_time()->set_step(0.5);
+  scene.mutable_time()->set_step(1.5);
   const auto id = submit(request);
   const auto told = watch(
       stub(), id, 0, [](const auto& one) { return one.job().state() == v1::SUCCEEDED || one.job().state() == v1::FAILED; },
@@ -79,6 +79,8 @@ TEST_P(RemovedFolder, EndsTheEngineByThatName) {
   const EngineJob job(bed(static_cast<std::uint32_t>(ranks), 1000));
   std::filesystem::create_directories(job.folder.attempt(1));
   std::vector<std::string> command = {BEDFLOW_BIN_DIR "/bedflow-engine", job.folder.root(), "--epoch", "1"};
+  for (const char* name : {"OMPI_ALLOW_RUN_AS_ROOT", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "OMPI_MCA_mpi_yield_when_idle"})
+    ::setenv(name, "1", 1);
   if (ranks > 1) command.insert(command.begin(), {"mpirun", "--oversubscribe", "--bind-to", "none", "-n", std::to_string(ranks)});
   auto engine = std::async(std::launch::async, [&] { return server::ask(command, 60s, 1 << 20); });
   ASSERT_TRUE(holds_within(30s, [&] { return !job.folder.checkpoint_steps().empty(); }));
