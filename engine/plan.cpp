@@ -25,7 +25,7 @@ constexpr double fluidized_pairs = 1.05;
 constexpr double particle_step_seconds = 0.06e-6;  // to the grid and back
 constexpr double cell_step_seconds = 0.18e-6;      // two outer iterations of SIMPLE
 constexpr double projection_cell_seconds = 0.16e-6;
-constexpr double start_seconds = 0.3;   // of the process
+constexpr double start_seconds = 0.2;   // of the process
 constexpr double process_bytes = 27e6;  // with MPI and HDF5, before it holds anything
 constexpr double copies = 1.9;          // of what it holds, while a list is rebuilt or a checkpoint written
 constexpr double contact_bytes = 64;    // in a checkpoint
@@ -185,7 +185,8 @@ void plan_cost(Plan& plan) {
   plan.seconds = steps * (cells * cost.cell + particles * (cost.particle + pairs * cost.pair));
   if (scene.particles && scene.particles->settling) {
     const double settled = std::min(1.2 * plan.fall_time, scene.particles->settling->duration);  // at rest soon after
-    plan.seconds += settled / plan.step * particles * (cost.particle + resting_pairs * cost.pair);
+    const double on_the_way = 0.5 * resting_pairs;                                               // none at first, all at the end
+    plan.seconds += settled / plan.step * particles * (cost.particle + on_the_way * cost.pair);
   }
   plan.seconds = start_seconds + plan.seconds / plan.ranks;
 }

@@ -88,7 +88,8 @@ std::optional<std::string> Queue::next(const std::map<std::string, Use>& uses,
 std::string Queue::reason(const std::string& id, const std::map<std::string, Use>& uses) const {
   const auto found = places_.find(id);
   if (found == places_.end()) return {};
-  const auto& [executor, place] = found->second;
+  const std::string& executor = found->second.first;
+  const Place& place = found->second.second;
   const Line& line = lines_.at(executor);
   const auto self = line.find(place);
   if (const double pause = seconds_until(self->second.not_before); pause > 0)
