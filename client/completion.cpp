@@ -163,7 +163,7 @@ Candidates contexts() {
 
 // By the option's name: the same name means the same thing in every verb.
 Candidates values_of(const CLI::Option& option, const Place& place, const std::string& current) {
-  const std::string name = option.get_single_name();
+  const std::string& name = option.get_single_name();
   const auto job = [&] { return place.words.empty() ? std::string() : place.words.front(); };
   if (name == "output") return {{"table", "for people"}, {"json", ""}, {"jsonl", "an object a line"}, {"csv", ""}};
   if (name == "axis") return {{"x", ""}, {"y", ""}, {"z", ""}};

@@ -263,7 +263,7 @@ std::filesystem::path write_page(const std::filesystem::path& folder, const std:
       if (run.condition == condition) of_it.push_back(&run);
     text += condition_text(folder, of_it);
   }
-  const auto page = folder / (name + ".md");
+  auto page = folder / (name + ".md");
   std::ofstream file(page);
   file << text;
   file.close();

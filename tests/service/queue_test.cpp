@@ -87,7 +87,7 @@ class Waiting : public ServiceTest {
     return request;
   }
   std::string run_until_cancelled(std::uint32_t ranks, const std::string& asks = "") {
-    const auto id = submit(with(job_of(100'000, "step_ms=5 " + asks), ranks));
+    auto id = submit(with(job_of(100'000, "step_ms=5 " + asks), ranks));
     wait_for(id, v1::RUNNING);
     return id;
   }

@@ -1,5 +1,4 @@
 // Preloaded into a program: its first fsync of a checkpoint takes BEDFLOW_SLOW_FSYNC_SECONDS, as on a disk that has stalled.
-#define _GNU_SOURCE
 #include <dlfcn.h>
 #include <stdio.h>
 #include <stdlib.h>
