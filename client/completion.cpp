@@ -149,7 +149,8 @@ Candidates states() {
 }
 
 bool takes_a_file(const CLI::Option& option) {
-  const std::string type = option.get_type_name(), name = option.get_single_name();
+  const std::string type = option.get_type_name();
+  const std::string& name = option.get_single_name();
   return type.find("FILE") != type.npos || type.find("FOLDER") != type.npos || name == "case" || name == "diff" ||
          name == "data" || name == "out" || option.get_description().find("folder") != std::string::npos;
 }
