@@ -225,8 +225,8 @@ Exit get(const Program& program, const OneStudyOptions& options) {
 Exit list(const Program& program, const OneStudyOptions& options) {
   const auto response = Connection(program.server).call(&Stub::ListStudies, v1::ListStudiesRequest());
   const std::vector<v1::Study> studies(response.studies().begin(), response.studies().end());
-  std::vector<const google::protobuf::Message*> messages;
-  for (const auto& study : studies) messages.push_back(&study);
+  const std::vector<const google::protobuf::Message*> messages(response.studies().pointer_begin(),
+                                                               response.studies().pointer_end());
   if (studies.empty()) say("no studies; begin one with: bedflow study CASE --vary ... --quantity ...");
   if (!studies.empty() || options.format != Format::table) print_messages(messages, table_of(studies), options.format);
   return Exit::ok;

@@ -189,7 +189,7 @@ Exit follow(const Connection& connection, TopOptions options) {
   while (!interrupt.wait(0) && !screen.has_ended()) {
     screen.draw(picture(connection, jobs, options, screen, trouble));
     const auto key = screen.key(200);
-    if (key == 'q' || key == '\3') return Exit::ok;
+    if (key && std::string_view("q\3").find(*key) != std::string_view::npos) return Exit::ok;  // \3: Ctrl-C
     if (key == 'a') options.all = !options.all;
     if (!key && Clock::now() < next_look) continue;
     next_look = Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(options.interval));

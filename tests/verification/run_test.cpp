@@ -156,7 +156,7 @@ TEST_F(JobRun, APackingIsTakenAsItLies) {
   std::string other = with(with(short_bed(), "cells { x: 6 y: 14 z: 4 }", "cells { x: 5 y: 12 z: 3 }"), "spring {", "coulomb {");
   other = with(other, "time { end: 0.004 }", "time { end: 0.0005 }");
   const auto packed = [&](const std::string& name, const std::string& text) {
-    const auto path = fresh(name, text, "checkpoints { keep: 9 }");
+    auto path = fresh(name, text, "checkpoints { keep: 9 }");
     if (comm.root()) std::filesystem::copy_file(source, path / "packing.h5");
     comm.barrier();
     return path;
