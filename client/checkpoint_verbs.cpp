@@ -66,7 +66,7 @@ Exit verify_checkpoint(const Program& program, const CheckpointOptions& options)
   if (options.format != Format::table || !found.good()) print_message(found, table, options.format);
   const std::string which = "the checkpoint of step " + std::to_string(found.step()) + " of " + found.job();
   if (!found.good()) throw Failure(Exit::corrupt, which + " is damaged", "bedflow checkpoint list " + found.job());
-  say(which + " is good, " + bytes_text(static_cast<double>(found.bytes())));
+  say(which + " is good, " + bytes_text(found.bytes()));
   return Exit::ok;
 }
 
@@ -75,8 +75,7 @@ class TransferLine {
  public:
   void show(std::uint64_t done, std::uint64_t all) {
     if (!terminal_.interactive()) return;
-    std::fprintf(stderr, "\r%s of %s\033[K", bytes_text(static_cast<double>(done)).c_str(),
-                 bytes_text(static_cast<double>(all)).c_str());
+    std::fprintf(stderr, "\r%s of %s\033[K", bytes_text(done).c_str(), bytes_text(all).c_str());
     shown_ = true;
   }
   ~TransferLine() {

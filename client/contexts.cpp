@@ -12,9 +12,12 @@
 #include <cstring>
 #include <fstream>
 #include <iterator>
+#include <system_error>
 
 #include "connection.h"
+#include "durable_file.h"
 #include "failure.h"
+#include "open_file.h"
 #include "token.h"
 
 namespace bedflow::client {
@@ -27,20 +30,6 @@ std::string variable(const char* name) {
   const char* value = std::getenv(name);
   return value ? value : "";
 }
-
-class OpenFile {
- public:
-  OpenFile(const std::string& path, int flags, mode_t mode = 0) : file_(::open(path.c_str(), flags | O_CLOEXEC, mode)) {}
-  ~OpenFile() {
-    if (file_ >= 0) ::close(file_);
-  }
-  OpenFile(const OpenFile&) = delete;
-  OpenFile& operator=(const OpenFile&) = delete;
-  int get() const { return file_; }
-
- private:
-  int file_;
-};
 
 // What it is and what it holds, from one and the same open file.
 std::string read_small(const std::string& path, const std::string& what, bool is_private) {
@@ -80,27 +69,13 @@ v1::Contexts read_contexts() {
 
 void write_contexts(const v1::Contexts& contexts) {
   const auto path = contexts_file();
-  const auto fail = [&](int error) {
-    throw Failure(Exit::other, path.string() + " cannot be written: " + std::strerror(error),
+  try {
+    fs::create_directories(path.parent_path());
+    write_durably(path, contexts);
+  } catch (const std::system_error& error) {
+    throw Failure(Exit::other, path.string() + " cannot be written: " + error.code().message(),
                   "XDG_CONFIG_HOME names another folder");
-  };
-  std::error_code error;
-  fs::create_directories(path.parent_path(), error);
-  if (error) fail(error.value());
-  std::string text;
-  google::protobuf::TextFormat::PrintToString(contexts, &text);
-  const std::string beside = path.string() + "." + std::to_string(::getpid());
-  {
-    const OpenFile file(beside, O_WRONLY | O_CREAT | O_TRUNC, 0600);
-    const bool written = file.get() >= 0 && ::write(file.get(), text.data(), text.size()) == static_cast<ssize_t>(text.size()) &&
-                         ::fsync(file.get()) == 0;
-    if (!written) {
-      const int why = errno;
-      ::unlink(beside.c_str());
-      fail(why);
-    }
   }
-  if (::rename(beside.c_str(), path.c_str()) != 0) fail(errno);
 }
 
 const v1::Context& find_context(const v1::Contexts& contexts, const std::string& name) {

@@ -1,9 +1,6 @@
 #include "job_request.h"
 
-#include <charconv>
 #include <chrono>
-#include <cmath>
-#include <map>
 #include <random>
 #include <thread>
 
@@ -42,13 +39,8 @@ v1::CheckpointName checkpoint_name(const std::string& text) {
 
 void add_wall_limit(CLI::App* verb, std::optional<double>& seconds) {
   const auto read = [&seconds](const std::string& text) {
-    const std::map<std::string, double> units = {{"", 1}, {"s", 1}, {"min", 60}, {"m", 60}, {"h", 3600}, {"d", 86400}};
-    double number = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-    const auto unit = units.find(std::string(end, text.data() + text.size()));
-    if (error != std::errc() || unit == units.end() || !std::isfinite(number) || number <= 0)
-      throw CLI::ValidationError("--wall-limit", text + " is no time; say e.g. 90 (seconds), 30min, 2h or 1.5d");
-    seconds = number * unit->second;
+    seconds = seconds_of_text(text);
+    if (!seconds) throw CLI::ValidationError("--wall-limit", text + " is no time; say e.g. 90 (seconds), 30min, 2h or 1.5d");
   };
   verb->add_option_function<std::string>("--wall-limit", read,
                                          "stop at a checkpoint after so much wall time of an attempt: 90 (s), 30min, 2h, 1d")

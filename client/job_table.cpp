@@ -61,16 +61,16 @@ Table table_of(const v1::Job& job) {
                duration_text(job.spec().wall_limit_seconds()) +
                    (job.spec().at_wall_limit() == v1::JobSpec::REQUEUE ? ", then it goes on when its turn comes again" : "")});
   }
-  if (job.planned_memory_bytes() > 0) table.add({"planned memory", bytes_text(static_cast<double>(job.planned_memory_bytes()))});
+  if (job.planned_memory_bytes() > 0) table.add({"planned memory", bytes_text(job.planned_memory_bytes())});
   table.add({"attempts", std::to_string(job.epoch())});
   table.add({"created", time_text(job.created_unix_nanos())});
   table.add({"changed", time_text(job.changed_unix_nanos())});
   table.add({"last event", std::to_string(job.last_sequence())});
   if (job.has_start_from_job())
-    table.add({"started from", job.start_from_job() + ", step " + std::to_string(job.start_from_step())});
+    table.add({"started from", job.start_from_job() + ", step " + std::to_string(job.start_from_step()) +
+                                   (job.packing_only() ? ", its particles alone" : "")});
   for (const auto& one : job.overrides()) table.add({"changed " + one.path(), one.from() + " -> " + one.to()});
-  if (!job.waits_for().empty()) table.add({"waits for", job.waits_for()});
-  if (job.has_memory_bytes()) table.add({"memory", bytes_text(static_cast<double>(job.memory_bytes()))});
+  if (job.has_memory_bytes()) table.add({"memory", bytes_text(job.memory_bytes())});
   if (job.has_rank_seconds()) table.add({"ranks x time", duration_text(job.rank_seconds())});
   if (job.pinned()) table.add({"pinned", "yes"});
   for (const auto step : job.pinned_steps()) table.add({"pinned checkpoint", std::to_string(step)});

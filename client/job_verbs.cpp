@@ -136,7 +136,7 @@ Exit delete_jobs(const Program& program, const DeleteOptions& options) {
     request.set_id(id);
     const auto response = connection.call(&Stub::DeleteJob, request, 120);
     table.add({id, response.freed_bytes()});
-    say(id + " is deleted; " + bytes_text(static_cast<double>(response.freed_bytes())) + " are free again");
+    say(id + " is deleted; " + bytes_text(response.freed_bytes()) + " are free again");
   }
   if (options.format != Format::table) print_data(table.text(options.format));
   return Exit::ok;

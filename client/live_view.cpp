@@ -76,8 +76,8 @@ std::string event_line(const v1::Event& event) {
     }
     case v1::Event::kCheckpoint:
       return "checkpoint of step " + std::to_string(event.checkpoint().step()) +
-             ", t = " + number_text(event.checkpoint().time()) + " s, " +
-             bytes_text(static_cast<double>(event.checkpoint().bytes())) + removed_text(event.checkpoint());
+             ", t = " + number_text(event.checkpoint().time()) + " s, " + bytes_text(event.checkpoint().bytes()) +
+             removed_text(event.checkpoint());
     case v1::Event::kLog: {
       const auto severity = event.log().severity();
       return (severity == v1::LogLine::INFO      ? ""

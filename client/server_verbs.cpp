@@ -21,8 +21,7 @@ std::string executor_text(const v1::ExecutorInfo& info) {
            std::to_string(info.ranks_in_use()) + " ranks; at most " + std::to_string(info.slots()) + " a job";
   }
   if (info.memory_bytes() > 0) {
-    text += ", " + bytes_text(static_cast<double>(info.memory_in_use())) + " of " +
-            bytes_text(static_cast<double>(info.memory_bytes())) + " by plans";
+    text += ", " + bytes_text(info.memory_in_use()) + " of " + bytes_text(info.memory_bytes()) + " by plans";
   }
   if (!info.trouble().empty()) text += "; it does not answer: " + info.trouble();
   return text;
@@ -54,7 +53,7 @@ Exit server_info(const Program& program, const InfoOptions& options) {
   table.add({"jobs running", std::to_string(info.jobs_running())});
   table.add({"jobs pending", std::to_string(info.jobs_pending())});
   for (const auto& job : info.queue()) table.add({"next", queued_text(job)});
-  table.add({"disk free", bytes_text(static_cast<double>(info.disk_free_bytes()))});
+  table.add({"disk free", bytes_text(info.disk_free_bytes())});
   for (const auto& law : info.built_laws()) table.add({"model", law});
   print_message(info, table, options.format);
   return Exit::ok;
@@ -66,10 +65,6 @@ struct UsageOptions {
   bool by_owner = false;
   Format format = Format::table;
 };
-
-std::string size_text(std::uint64_t bytes) {
-  return bytes_text(static_cast<double>(bytes));
-}
 
 // "3 of 10"; the number alone without a limit.
 template <class Number>
@@ -85,22 +80,22 @@ Table totals(const v1::Usage& usage) {
       {"jobs running", of_limit(std::to_string(usage.jobs_running()), quota.has_running(), std::to_string(quota.running()))});
   table.add({"jobs waiting", std::to_string(usage.jobs_pending())});
   table.add({"ranks in use", std::to_string(usage.ranks_in_use()) + " of " + std::to_string(usage.slots())});
-  table.add({"memory in use", size_text(usage.memory_bytes())});
-  table.add({"disk in use", of_limit(size_text(usage.disk_bytes()), quota.has_bytes(), size_text(quota.bytes()))});
-  table.add({"disk free", size_text(usage.disk_free_bytes()) +
-                              (usage.disk_reserve_bytes() > 0 ? "; reserve " + size_text(usage.disk_reserve_bytes()) : "")});
+  table.add({"memory in use", bytes_text(usage.memory_bytes())});
+  table.add({"disk in use", of_limit(bytes_text(usage.disk_bytes()), quota.has_bytes(), bytes_text(quota.bytes()))});
+  table.add({"disk free", bytes_text(usage.disk_free_bytes()) +
+                              (usage.disk_reserve_bytes() > 0 ? "; reserve " + bytes_text(usage.disk_reserve_bytes()) : "")});
   table.add({"CPU hours", number_text(usage.rank_seconds() / 3600)});
   if (usage.removed_jobs() + usage.removed_checkpoints() > 0) {
     table.add({"removed by retention", std::to_string(usage.removed_jobs()) + " jobs, " +
                                            std::to_string(usage.removed_checkpoints()) + " checkpoints, " +
-                                           size_text(usage.removed_bytes())});
+                                           bytes_text(usage.removed_bytes())});
   }
   return table;
 }
 
 // Sizes for people have units, those for programs are bytes.
 Cell size_cell(std::uint64_t bytes, Format format) {
-  if (format == Format::table) return size_text(bytes);
+  if (format == Format::table) return bytes_text(bytes);
   return bytes;
 }
 
@@ -113,7 +108,7 @@ Table owners(const v1::Usage& usage, Format format) {
     };
     add(one.quota().has_jobs(), std::to_string(one.quota().jobs()) + " jobs");
     add(one.quota().has_running(), std::to_string(one.quota().running()) + " running");
-    add(one.quota().has_bytes(), size_text(one.quota().bytes()));
+    add(one.quota().has_bytes(), bytes_text(one.quota().bytes()));
     table.add({one.owner(), std::uint64_t{one.jobs()}, std::uint64_t{one.running()}, size_cell(one.bytes(), format),
                one.rank_seconds() / 3600, size_cell(one.memory_bytes(), format), quota.empty() ? Cell() : Cell(quota)});
   }

@@ -15,6 +15,22 @@ namespace {
 
 constexpr int panel_width = 820, panel_height = 560, title_height = 56;
 
+// Of every axis along which a point differs from the reference what `say` makes of it, with `between` in between.
+template <class Say>
+std::string differences(const v1::StudySpec& spec, int point, const char* between, Say say) {
+  const auto& reference = spec.points(static_cast<int>(spec.reference()));
+  std::string text;
+  for (int a = 0; a < spec.axes_size(); ++a)
+    if (spec.points(point).values(a) != reference.values(a)) text += (text.empty() ? "" : between) + say(a);
+  return text;
+}
+std::string values_of(const v1::StudySpec& spec, int point) {
+  return differences(spec, point, ", ", [&](int axis) { return spec.points(point).values(axis); });
+}
+std::string axes_of(const v1::StudySpec& spec, int point) {
+  return differences(spec, point, " and ", [&](int axis) { return spec.axes(axis); });
+}
+
 bool has_error(const v1::StudyRun& run, int quantity) {
   return quantity < run.errors_size() && run.errors(quantity).has_value();
 }
@@ -88,15 +104,6 @@ Table long_form(const v1::Study& study) {
   return table;
 }
 
-// The values of a point in which it differs from the reference.
-std::string mark_of(const v1::StudySpec& spec, int point) {
-  const auto& reference = spec.points(static_cast<int>(spec.reference()));
-  std::string text;
-  for (int a = 0; a < spec.axes_size(); ++a)
-    if (spec.points(point).values(a) != reference.values(a)) text += (text.empty() ? "" : ", ") + spec.points(point).values(a);
-  return text;
-}
-
 // One point of a line in the picture: cost, error and interval in per cent, and what to write beside it.
 std::string plot_row(const v1::Study& study, int point, int quantity) {
   const auto& run = study.runs(point);
@@ -105,16 +112,7 @@ std::string plot_row(const v1::Study& study, int point, int quantity) {
   const bool is_reference = point == static_cast<int>(study.spec().reference());
   const double value = relative(study, quantity, error.value()), half = relative(study, quantity, error.half_width());
   return number_text(run.cost().cpu_seconds()) + " " + number_text(value) + " " + number_text(is_reference ? 0 : half) + " " +
-         gnuplot_quoted(mark_of(study.spec(), point)) + "\n";
-}
-
-// The axis along which a point differs from the reference: none of the reference itself, all as one of a full grid.
-std::string line_of(const v1::StudySpec& spec, int point) {
-  const auto& reference = spec.points(static_cast<int>(spec.reference()));
-  std::string name;
-  for (int a = 0; a < spec.axes_size(); ++a)
-    if (spec.points(point).values(a) != reference.values(a)) name += (name.empty() ? "" : " and ") + spec.axes(a);
-  return name;
+         gnuplot_quoted(values_of(study.spec(), point)) + "\n";
 }
 
 }  // namespace
@@ -128,12 +126,8 @@ std::string study_state_name(v1::StudyState state) {
 }
 
 std::string point_name(const v1::StudySpec& spec, int point) {
-  const auto& reference = spec.points(static_cast<int>(spec.reference()));
-  std::string name;
-  for (int a = 0; a < spec.axes_size(); ++a) {
-    const auto& value = spec.points(point).values(a);
-    if (value != reference.values(a)) name += (name.empty() ? "" : " ") + spec.axes(a) + "=" + value;
-  }
+  const auto name =
+      differences(spec, point, " ", [&](int axis) { return spec.axes(axis) + "=" + spec.points(point).values(axis); });
   return name.empty() ? "reference" : name;
 }
 
@@ -201,7 +195,7 @@ std::string study_plot(const v1::Study& study, const std::filesystem::path& file
   text += "set key below center maxrows 1 Left reverse samplen 2 nobox\nset logscale x\n";
   if (dearest > 0) text += "set xrange [" + number_text(0.8 * cheapest) + ":" + number_text(1.4 * dearest) + "]\n";
   std::set<std::string> lines;
-  for (int i = 0; i < spec.points_size(); ++i) lines.insert(line_of(spec, i));
+  for (int i = 0; i < spec.points_size(); ++i) lines.insert(axes_of(spec, i));
   lines.erase("");
   for (int q = 0; q < panels; ++q) {
     std::string front, draws;
@@ -211,7 +205,7 @@ std::string study_plot(const v1::Study& study, const std::filesystem::path& file
     for (const auto& line : lines) {
       std::vector<std::pair<double, std::string>> points;
       for (int i = 0; i < spec.points_size(); ++i) {
-        const bool belongs = line_of(spec, i) == line || i == static_cast<int>(spec.reference());
+        const bool belongs = axes_of(spec, i) == line || i == static_cast<int>(spec.reference());
         if (const auto row = plot_row(study, i, q); belongs && !row.empty())
           points.emplace_back(study.runs(i).cost().cpu_seconds(), row);
       }

@@ -245,7 +245,7 @@ Exit remove(const Program& program, const OneStudyOptions& options) {
   request.set_id(options.study);
   request.set_with_jobs(options.with_jobs);
   const auto response = Connection(program.server).call(&Stub::DeleteStudy, request, 120);
-  say("study " + options.study + " is deleted; " + bytes_text(static_cast<double>(response.freed_bytes())) + " are free again" +
+  say("study " + options.study + " is deleted; " + bytes_text(response.freed_bytes()) + " are free again" +
       (options.with_jobs ? "" : "; its jobs are still there"));
   return Exit::ok;
 }

@@ -4,9 +4,11 @@
 #include <unistd.h>
 
 #include <array>
+#include <charconv>
 #include <cmath>
 #include <cstdlib>
 #include <ctime>
+#include <map>
 #include <string_view>
 
 namespace bedflow::client {
@@ -79,11 +81,13 @@ std::string duration_text(double seconds) {
   return printed("%lldd %02lldh", whole / 86400, whole / 3600 % 24);
 }
 
-std::string bytes_text(double bytes) {
-  constexpr std::array<const char*, 5> units = {"B", "KiB", "MiB", "GiB", "TiB"};
-  std::size_t unit = 0;
-  while (bytes >= 1024 && unit + 1 < units.size()) bytes /= 1024, ++unit;
-  return printed(unit == 0 ? "%.0f %s" : "%.1f %s", bytes, units[unit]);
+std::optional<double> seconds_of_text(const std::string& text) {
+  static const std::map<std::string, double> units = {{"", 1}, {"s", 1}, {"min", 60}, {"m", 60}, {"h", 3600}, {"d", 86400}};
+  double number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  const auto unit = units.find(std::string(end, text.data() + text.size()));
+  if (error != std::errc() || unit == units.end() || !std::isfinite(number) || number <= 0) return std::nullopt;
+  return number * unit->second;
 }
 
 std::string time_text(std::int64_t unix_nanos) {

@@ -2,7 +2,10 @@
 #pragma once
 
 #include <cstdio>
+#include <optional>
 #include <string>
+
+#include "size_text.h"
 
 namespace bedflow::client {
 
@@ -31,7 +34,8 @@ std::size_t display_width(const std::string& text);  // columns of UTF-8 text wi
 
 // "1h 02m", "3m 05s", "12 s"; of a length of time in seconds.
 std::string duration_text(double seconds);
-std::string bytes_text(double bytes);            // "12.3 MiB"
+// "90" (s), "45s", "30min" or "30m", "2h", "1.5d": above 0; nothing when it is none of these.
+std::optional<double> seconds_of_text(const std::string& text);
 std::string time_text(std::int64_t unix_nanos);  // local time "2026-01-31 13:05:09"; "-" for 0
 // Six significant digits, the shortest form.
 std::string number_text(double value);

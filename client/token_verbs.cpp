@@ -3,12 +3,14 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <cctype>
 #include <cerrno>
-#include <charconv>
 #include <chrono>
+#include <cmath>
 #include <cstring>
 
 #include "connection.h"
+#include "open_file.h"
 #include "terminal.h"
 #include "token.h"
 #include "verbs.h"
@@ -28,34 +30,30 @@ std::int64_t now_nanos() {
   return std::chrono::nanoseconds(std::chrono::system_clock::now().time_since_epoch()).count();
 }
 
-// "90d", "12h", "30m" or "45s".
 std::chrono::seconds life(const std::string& text) {
-  std::int64_t number = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  const std::string unit(end, text.data() + text.size());
-  const std::int64_t seconds = unit == "d" ? 86'400 : unit == "h" ? 3600 : unit == "m" ? 60 : unit == "s" ? 1 : 0;
-  constexpr std::int64_t longest = 3650LL * 86'400;
-  if (error != std::errc() || seconds == 0 || number < 1 || number > longest / seconds)
+  constexpr double longest = 3650.0 * 86'400;
+  const auto seconds = seconds_of_text(text);
+  const bool has_unit = !text.empty() && std::isalpha(static_cast<unsigned char>(text.back())) != 0;
+  if (!seconds || !has_unit || *seconds < 1 || *seconds > longest)
     throw Failure(Exit::usage, "--expires " + text + ": a number with d, h, m or s, 1s to 3650d", "--expires 90d");
-  return std::chrono::seconds(number * seconds);
+  return std::chrono::seconds(std::llround(*seconds));
 }
 
 // A file that is this user's alone, with the token; gone again unless it is kept.
 class SecretFile {
  public:
   SecretFile(const std::string& path, const std::string& content) : path_(path) {
-    const int file = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600);
-    if (file < 0) {
+    const OpenFile file(path, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW, 0600);
+    if (file.get() < 0) {
       throw Failure(
           Exit::usage,
           "--out " + path + ": " + (errno == EEXIST ? "is there already, and is not written over" : std::strerror(errno)),
           "name a file that is not there yet");
     }
     const bool written =
-        ::write(file, content.data(), content.size()) == static_cast<ssize_t>(content.size()) && ::fsync(file) == 0;
-    const int error = errno;
-    ::close(file);
+        ::write(file.get(), content.data(), content.size()) == static_cast<ssize_t>(content.size()) && ::fsync(file.get()) == 0;
     if (written) return;
+    const int error = errno;
     ::unlink(path.c_str());
     throw Failure(Exit::limit, "--out " + path + " cannot be written: " + std::strerror(error));
   }

@@ -134,7 +134,7 @@ Table for_people(const std::vector<Row>& rows, bool unicode) {
                progress_cell(job, unicode),
                job.has_progress() ? number_text(progress.time()) + "/" + number_text(progress.end_time()) : "-",
                speed ? rate_text(*speed) + " s/s" : "-", has_eta ? duration_text(progress.eta_seconds()) : "-",
-               job.has_memory_bytes() ? bytes_text(static_cast<double>(job.memory_bytes())) : "-", waiting_text(job)});
+               job.has_memory_bytes() ? bytes_text(job.memory_bytes()) : "-", waiting_text(job)});
   }
   return table;
 }
@@ -142,7 +142,7 @@ Table for_people(const std::vector<Row>& rows, bool unicode) {
 std::string head_line(const Connection& connection, const v1::ServerInfo& info) {
   return "bedflow top   " + connection.address() + "   " + std::to_string(info.jobs_running()) + " running, " +
          std::to_string(info.jobs_pending()) + " waiting   ranks " + std::to_string(info.ranks_in_use()) + "/" +
-         std::to_string(info.slots()) + "   disk " + bytes_text(static_cast<double>(info.disk_free_bytes())) + " free";
+         std::to_string(info.slots()) + "   disk " + bytes_text(info.disk_free_bytes()) + " free";
 }
 
 std::vector<std::string> lines_of(const std::string& text) {

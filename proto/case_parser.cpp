@@ -76,10 +76,14 @@ std::string advice(const Descriptor& type, const std::string& name) {
     all.push_back(known);
     if (name.size() <= longest_name && distance(name, known) <= std::max<std::size_t>(1, known.size() / 3)) near.push_back(known);
   }
-  for (int i = 0; i < type.file()->message_type_count(); ++i) {
-    const Descriptor& other = *type.file()->message_type(i);
-    if (other.FindFieldByName(name) != nullptr) elsewhere.push_back(other.name());
-  }
+  const auto look = [&](const google::protobuf::FileDescriptor& file) {
+    for (int i = 0; i < file.message_type_count(); ++i) {
+      if (file.message_type(i)->FindFieldByName(name) != nullptr) elsewhere.push_back(file.message_type(i)->name());
+    }
+  };
+  const auto& schema = *v1::Case::descriptor()->file();
+  look(schema);
+  for (int i = 0; i < schema.dependency_count(); ++i) look(*schema.dependency(i));
   std::string text;
   if (!near.empty()) {
     text = "; did you mean " + joined(near) + "?";

@@ -17,6 +17,8 @@
 #include <optional>
 #include <system_error>
 
+#include "open_file.h"
+
 namespace bedflow {
 namespace {
 
@@ -71,20 +73,6 @@ bool later_record_follows(std::string_view bytes, std::uint64_t expected) {
   }
   return false;
 }
-
-class OpenFile {
- public:
-  OpenFile(const std::filesystem::path& path, int flags) : file_(::open(path.c_str(), flags | O_CLOEXEC)) {}
-  ~OpenFile() {
-    if (file_ >= 0) ::close(file_);
-  }
-  OpenFile(const OpenFile&) = delete;
-  OpenFile& operator=(const OpenFile&) = delete;
-  int get() const { return file_; }
-
- private:
-  int file_;
-};
 
 // Into the memory that `bytes` has.
 void read_at(int file, std::uint64_t offset, std::size_t most, const std::filesystem::path& path, std::string& bytes) {

@@ -7,12 +7,11 @@
 #include <string>
 
 #include "bedflow/v1/service.pb.h"
+#include "clock.h"
 
 namespace bedflow::server {
 
 inline constexpr const char* local_owner = "local";  // whoever can open the server's socket: the server's own user
-
-std::int64_t now_nanos();  // since the epoch of Unix
 
 // A token that the server knows.
 struct KnownToken {

@@ -153,8 +153,8 @@ void Jobs::keep_plan(v1::Job& job, const v1::PlanReport& plan) const {
   if (memory <= 0 || plan.memory_bytes() <= memory) return;
   v1::Fault fault;
   fault.set_path("memory");
-  fault.set_text("needs " + bytes_text(plan.memory_bytes()) + " by its plan; all jobs of the executor " + job.spec().executor() +
-                 " together may have " + bytes_text(memory));
+  fault.set_text("needs " + memory_text(plan.memory_bytes()) + " by its plan; all jobs of the executor " + job.spec().executor() +
+                 " together may have " + memory_text(memory));
   throw Refusal(Refused::invalid_case, "the case can never run on this server",
                 settings_.slurm ? "bedflow submit CASE --executor slurm" : "bedflow explain CASE", {fault});
 }
@@ -177,9 +177,7 @@ v1::CreateJobResponse Jobs::commit(JobRecord& record, const v1::CreateJobRequest
     const auto step = record.job.start_from_step();
     const auto from = folder_of(record.job.start_from_job()).checkpoint(step);
     const auto to = record.from_step ? folder.checkpoint(step) : folder.packing();
-    std::error_code failed;
-    fs::create_hard_link(from, to, failed);
-    if (failed) fs::copy_file(from, to);
+    put_beside(from, to);
     sync_folder(to.parent_path());
   }
   const std::lock_guard guard(mutex_);

@@ -1,11 +1,8 @@
 #include "folder.h"
 
-#include <fcntl.h>
 #include <google/protobuf/text_format.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <charconv>
 #include <cstdio>
 #include <fstream>
@@ -18,10 +15,6 @@ namespace bedflow::server {
 namespace {
 
 namespace fs = std::filesystem;
-
-[[noreturn]] void fail(const std::string& doing, const fs::path& path) {
-  throw std::system_error(errno, std::generic_category(), doing + " " + path.string());
-}
 
 template <class Number>
 std::optional<Number> whole_number(std::string_view text) {
@@ -91,53 +84,14 @@ void JobFolder::command(v1::Control::Command command, bool skip_checkpoint) cons
   write_durably(control(), next);
 }
 
-void write_durably(const fs::path& path, std::string_view content) {
-  const fs::path beside = path.string() + ".new";
-  const int file = ::open(beside.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
-  if (file < 0) fail("creating", beside);
-  const auto size = static_cast<off_t>(content.size());
-  while (!content.empty()) {
-    const ssize_t written = ::write(file, content.data(), content.size());
-    if (written < 0 && errno == EINTR) continue;
-    if (written < 0) break;
-    content.remove_prefix(static_cast<std::size_t>(written));
-  }
-  const bool whole = content.empty() && ::ftruncate(file, size) == 0 && ::fsync(file) == 0;
-  const int error = errno;
-  ::close(file);
-  if (!whole) {
-    ::unlink(beside.c_str());
-    errno = error;
-    fail("writing", beside);
-  }
-  if (::rename(beside.c_str(), path.c_str()) != 0) fail("replacing", path);
-  sync_folder(path.parent_path());
-}
-
-void reserve(const fs::path& path) {
-  const fs::path beside = path.string() + ".new";
-  const int file = ::open(beside.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
-  if (file < 0) fail("creating", beside);
-  const int error = ::posix_fallocate(file, 0, 4096);
-  ::close(file);
-  if (error == 0) return;
-  ::unlink(beside.c_str());
-  errno = error;
-  fail("finding room for", path);
-}
-
-void write_durably(const fs::path& path, const google::protobuf::Message& message) {
-  std::string text;
-  google::protobuf::TextFormat::PrintToString(message, &text);
-  write_durably(path, text);
-}
-
-void sync_folder(const fs::path& folder) {
-  const int file = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (file < 0) fail("opening", folder);
-  const int result = ::fsync(file);
-  ::close(file);
-  if (result != 0) fail("syncing", folder);
+void put_beside(const fs::path& file, const fs::path& name) {
+  std::error_code failed;
+  fs::create_hard_link(file, name, failed);
+  if (!failed || failed == std::errc::file_exists) return;
+  if (failed == std::errc::no_such_file_or_directory) throw fs::filesystem_error("linking", file, failed);
+  const fs::path part = name.string() + ".partial";
+  fs::copy_file(file, part, fs::copy_options::overwrite_existing);
+  fs::rename(part, name);
 }
 
 bool read_message(const fs::path& path, google::protobuf::Message& message) {

@@ -1,4 +1,4 @@
-// A job's folder, by the contract on top of job.proto: its paths, and durable replacement of its small files.
+// A job's folder, by the contract on top of job.proto: its paths, and what is read of its small files.
 #pragma once
 
 #include <google/protobuf/message.h>
@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "bedflow/v1/job.pb.h"
+#include "durable_file.h"
 
 namespace bedflow::server {
 
@@ -66,13 +67,11 @@ class DraftFolder {
   const JobFolder folder;
 };
 
-// Writes beside, fsyncs, renames, fsyncs the folder: the file is the old or the new one, whatever happens. Throws
-// std::system_error.
-void write_durably(const std::filesystem::path& path, std::string_view content);
-void write_durably(const std::filesystem::path& path, const google::protobuf::Message& message);  // text format
-// Room on the disk for one coming write_durably of at most 4096 bytes there. Throws std::system_error.
-void reserve(const std::filesystem::path& path);
-void sync_folder(const std::filesystem::path& folder);
+using bedflow::write_durably;
+
+// A second name of a file, unless there is one of that name already; where the file system has no second names, a second file.
+// Throws std::filesystem::filesystem_error.
+void put_beside(const std::filesystem::path& file, const std::filesystem::path& name);
 
 // False when the file is not there or is no such message.
 bool read_message(const std::filesystem::path& path, google::protobuf::Message& message);

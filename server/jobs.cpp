@@ -32,10 +32,6 @@ std::string steps_text(const std::vector<std::uint64_t>& steps) {
 
 }  // namespace
 
-std::int64_t now_nanos() {
-  return std::chrono::nanoseconds(std::chrono::system_clock::now().time_since_epoch()).count();
-}
-
 std::uint64_t existing_step(const JobFolder& folder, const std::string& id, std::optional<std::uint64_t> wanted) {
   const auto steps = folder.checkpoint_steps();
   for (const auto step : steps) {

@@ -5,6 +5,7 @@
 
 #include "jobs.h"
 #include "refusal.h"
+#include "size_text.h"
 
 namespace bedflow::server {
 namespace {
@@ -49,8 +50,7 @@ std::string Jobs::why_not_start(const std::string& owner) const {
   if (settings_.disk_reserve > 0) {
     const auto free = free_bytes(settings_.data);
     if (free < settings_.disk_reserve)
-      return "room on the disk: " + text_of_bytes(free) + " are free, and the reserve is " +
-             text_of_bytes(settings_.disk_reserve);
+      return "room on the disk: " + bytes_text(free) + " are free, and the reserve is " + bytes_text(settings_.disk_reserve);
   }
   if (!settings_.quotas.any()) return {};
   const auto why = why_not_run(settings_.quotas.of(owner), running(owner), "owner " + owner);

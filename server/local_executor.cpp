@@ -11,28 +11,15 @@
 #include <system_error>
 #include <vector>
 
+#include "open_file.h"
 #include "process.h"
 
 namespace bedflow::server {
 namespace {
 
-class File {
- public:
-  File(const std::filesystem::path& path, int flags) : number_(::open(path.c_str(), flags | O_CLOEXEC, 0600)) {}
-  ~File() {
-    if (number_ >= 0) ::close(number_);
-  }
-  File(const File&) = delete;
-  File& operator=(const File&) = delete;
-  int number() const { return number_; }
-
- private:
-  int number_;
-};
-
 bool lock_is_held(const JobFolder& folder, std::uint32_t epoch) {
-  const File lock(folder.lock(epoch), O_RDONLY);
-  return lock.number() >= 0 && ::flock(lock.number(), LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+  const OpenFile lock(folder.lock(epoch), O_RDONLY);
+  return lock.get() >= 0 && ::flock(lock.get(), LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK;
 }
 
 // Processes of an attempt. Ranks outlive a killed mpirun, and with it the lock, by a second or two: they are told by the folder
@@ -58,13 +45,13 @@ void LocalExecutor::start(const JobFolder& folder, const AttemptOrder& order) {
   }
   std::filesystem::create_directories(folder.attempt(epoch));
   sync_folder(folder.attempts());
-  const File lock(folder.lock(epoch), O_RDWR | O_CREAT);
-  const File output(folder.output_log(epoch), O_WRONLY | O_CREAT | O_APPEND);
-  const File error(folder.error_log(epoch), O_WRONLY | O_CREAT | O_APPEND);
-  if (lock.number() < 0 || output.number() < 0 || error.number() < 0) {
+  const OpenFile lock(folder.lock(epoch), O_RDWR | O_CREAT, 0600);
+  const OpenFile output(folder.output_log(epoch), O_WRONLY | O_CREAT | O_APPEND, 0600);
+  const OpenFile error(folder.error_log(epoch), O_WRONLY | O_CREAT | O_APPEND, 0600);
+  if (lock.get() < 0 || output.get() < 0 || error.get() < 0) {
     throw std::system_error(errno, std::generic_category(), "creating the files of " + folder.attempt(epoch).string());
   }
-  if (::flock(lock.number(), LOCK_EX | LOCK_NB) != 0) throw std::runtime_error("attempt " + std::to_string(epoch) + " is taken");
+  if (::flock(lock.get(), LOCK_EX | LOCK_NB) != 0) throw std::runtime_error("attempt " + std::to_string(epoch) + " is taken");
   reserve(folder.runner(epoch));  // a disk that fills up later does not keep the runner from saying how it ended
   reserve(folder.exit_record(epoch));
 
@@ -74,9 +61,9 @@ void LocalExecutor::start(const JobFolder& folder, const AttemptOrder& order) {
   if (order.from_step) command.insert(command.end(), {"--from", std::to_string(*order.from_step)});
   runners_.push_back(launch({.command = command,
                              .environment = {},
-                             .output = output.number(),
-                             .error = error.number(),
-                             .kept = lock.number(),
+                             .output = output.get(),
+                             .error = error.get(),
+                             .kept = lock.get(),
                              .new_session = true}));
 }
 

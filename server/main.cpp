@@ -13,7 +13,6 @@
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
-#include <set>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -28,6 +27,7 @@
 #include "runner.h"
 #include "security.h"
 #include "service.h"
+#include "size_text.h"
 #include "studies.h"
 #include "tokens.h"
 #include "watch.h"
@@ -83,14 +83,20 @@ void wait_for_end(const sigset_t& signals, const std::function<bool()>& has_noth
   }
 }
 
-std::set<std::string> jobs_of(Studies& studies) {
-  std::set<std::string> jobs;
-  const auto list = studies.list();
-  for (const auto& study : list.studies()) {
-    if (study.has_packing_job()) jobs.insert(study.packing_job());
-    for (const auto& run : study.runs()) jobs.insert(run.job());
+// Tells the log, and whoever has started the server. Returns the addresses in one line.
+std::string announce(const Options& options, const std::vector<std::string>& addresses, const Tokens& tokens) {
+  std::string all;
+  for (const auto& address : addresses) {
+    all += (all.empty() ? "" : ", ") + address;
+    spdlog::info("bedflowd " BEDFLOW_VERSION " serves {} on {} with {} slots", options.settings.data.string(), address,
+                 options.settings.slots);
+    std::printf("listening on %s\n", address.c_str());
   }
-  return jobs;
+  std::fflush(stdout);
+  if (options.listening.has_network() && tokens.empty())
+    spdlog::info("there are no tokens yet: bedflow server token create OWNER --scope submit --out FILE --server {}",
+                 *std::ranges::find_if(addresses, [](const auto& address) { return address.starts_with("unix:"); }));
+  return all;
 }
 
 [[noreturn]] void serve(Options& options) {
@@ -119,18 +125,8 @@ std::set<std::string> jobs_of(Studies& studies) {
   Housekeeping housekeeping(jobs, readers, operating);
   JobService service(jobs, studies, watchers, readers, housekeeping, options.settings.programs.engine, door, tokens);
   const auto server = listen(options.listening, listened, service, door, tokens, housekeeping.calls());
-  housekeeping.start([&] { return std::pair(watchers.count(), service.calls()); }, [&] { return jobs_of(studies); });
-  std::string all;
-  for (const auto& address : listened) {
-    all += (all.empty() ? "" : ", ") + address;
-    spdlog::info("bedflowd " BEDFLOW_VERSION " serves {} on {} with {} slots", data.string(), address, options.settings.slots);
-    std::printf("listening on %s\n", address.c_str());
-  }
-  std::fflush(stdout);
-  service.set_addresses(all);
-  if (options.listening.has_network() && tokens.empty())
-    spdlog::info("there are no tokens yet: bedflow server token create OWNER --scope submit --out FILE --server {}",
-                 *std::ranges::find_if(listened, [](const auto& address) { return address.starts_with("unix:"); }));
+  housekeeping.start([&] { return std::pair(watchers.count(), service.calls()); }, [&] { return studies.jobs(); });
+  service.set_addresses(announce(options, listened, tokens));
 
   std::atomic<bool> ending = false;
   auto last_round = std::chrono::steady_clock::now();
@@ -225,7 +221,7 @@ int copy_data(const BackupOptions& options) {
   const auto report = back_up(options.data, options.to);
   std::printf("%llu jobs; %llu files that were new or had changed, %s, copied to %s\n",
               static_cast<unsigned long long>(report.jobs), static_cast<unsigned long long>(report.files),
-              text_of_bytes(report.bytes).c_str(), options.to.c_str());
+              bytes_text(report.bytes).c_str(), options.to.c_str());
   return 0;
 }
 

@@ -1,5 +1,7 @@
 #include "operating_options.h"
 
+#include "size_text.h"
+
 namespace bedflow::server {
 
 void add_operating_options(CLI::App& app, OperatingOptions& options) {

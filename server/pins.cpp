@@ -12,17 +12,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A second name of a file; where the file system has none, a second file.
-void put_beside(const fs::path& file, const fs::path& name) {
-  std::error_code failed;
-  fs::create_hard_link(file, name, failed);
-  if (!failed || failed == std::errc::file_exists) return;
-  if (failed == std::errc::no_such_file_or_directory) throw fs::filesystem_error("linking", file, failed);
-  const fs::path part = name.string() + ".partial";
-  fs::copy_file(file, part, fs::copy_options::overwrite_existing);
-  fs::rename(part, name);
-}
-
 void pin_checkpoint(const JobFolder& folder, const std::string& id, std::uint64_t step) {
   existing_step(folder, id, step);
   fs::create_directories(folder.pinned());

@@ -2,10 +2,11 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <iterator>
+
+#include "clock.h"
 
 namespace bedflow::server {
 namespace {
@@ -14,7 +15,7 @@ constexpr std::ptrdiff_t most_counted = 1000;  // of those ahead
 
 }  // namespace
 
-std::string bytes_text(double bytes) {
+std::string memory_text(double bytes) {
   const bool is_large = bytes >= 0.95 * (1 << 30);
   std::array<char, 32> text{};
   std::snprintf(text.data(), text.size(), is_large ? "%.1f GiB" : "%.0f MiB",
@@ -24,8 +25,7 @@ std::string bytes_text(double bytes) {
 
 double seconds_until(std::int64_t unix_nanos) {
   constexpr double longest_pause = 60;
-  const auto now = std::chrono::nanoseconds(std::chrono::system_clock::now().time_since_epoch()).count();
-  const double left = 1e-9 * static_cast<double>(unix_nanos - now);
+  const double left = 1e-9 * static_cast<double>(unix_nanos - now_nanos());
   return left > longest_pause ? 0 : std::max(left, 0.0);
 }
 
@@ -66,8 +66,8 @@ std::string Queue::lacks(const std::string& executor, const Waiting& job, const 
            (free == 1 ? " is free)" : " are free)");
   }
   if (memory > 0 && job.memory_bytes > 0 && use.memory_bytes + job.memory_bytes > memory) {
-    text += (text.empty() ? "" : " and ") + bytes_text(job.memory_bytes) + " of memory (" +
-            bytes_text(memory - use.memory_bytes) + " of " + bytes_text(memory) + " are free)";
+    text += (text.empty() ? "" : " and ") + memory_text(job.memory_bytes) + " of memory (" +
+            memory_text(memory - use.memory_bytes) + " of " + memory_text(memory) + " are free)";
   }
   return text;
 }

@@ -62,7 +62,7 @@ class Queue {
   std::map<std::string, std::pair<std::string, Place>> places_;  // by id
 };
 
-std::string bytes_text(double bytes);  // "3.1 GiB"
+std::string memory_text(double bytes);  // "900 MiB", "3.1 GiB": as plans tell it
 
 // How long until then, s; a clock that was set back makes nobody wait for longer than any pause is.
 double seconds_until(std::int64_t unix_nanos);

@@ -1,16 +1,11 @@
 #include "quota.h"
 
-#include <array>
 #include <charconv>
-#include <cmath>
-#include <cstdio>
-#include <limits>
 #include <stdexcept>
-#include <string_view>
-#include <utility>
 
 #include "refusal.h"
 #include "security.h"
+#include "size_text.h"
 
 namespace bedflow::server {
 namespace {
@@ -64,10 +59,9 @@ void require_room(const v1::Quota& quota, const Holding& now, const std::string&
                   "bedflow server usage; bedflow delete JOB");
   }
   if (quota.has_bytes() && now.bytes >= quota.bytes()) {
-    throw Refusal(
-        Refused::quota,
-        whose + " may fill " + text_of_bytes(quota.bytes()) + " of the disk, and the jobs take " + text_of_bytes(now.bytes),
-        "bedflow server usage; bedflow delete JOB");
+    throw Refusal(Refused::quota,
+                  whose + " may fill " + bytes_text(quota.bytes()) + " of the disk, and the jobs take " + bytes_text(now.bytes),
+                  "bedflow server usage; bedflow delete JOB");
   }
 }
 
@@ -75,38 +69,6 @@ std::string why_not_run(const v1::Quota& quota, std::uint64_t running, const std
   if (!quota.has_running() || running < quota.running()) return {};
   return "the quota of running jobs: " + whose + " may run " + std::to_string(quota.running()) + " at once, and " +
          std::to_string(running) + (running == 1 ? " runs" : " run");
-}
-
-std::uint64_t bytes_of_text(const std::string& text) {
-  static const std::array<std::pair<std::string_view, double>, 9> units = {{{"", 1},
-                                                                            {"B", 1},
-                                                                            {"KiB", 1024.0},
-                                                                            {"MiB", 1024.0 * 1024},
-                                                                            {"GiB", 1024.0 * 1024 * 1024},
-                                                                            {"TiB", 1024.0 * 1024 * 1024 * 1024},
-                                                                            {"MB", 1e6},
-                                                                            {"GB", 1e9},
-                                                                            {"TB", 1e12}}};
-  double number = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  std::string_view unit(end, static_cast<std::size_t>(text.data() + text.size() - end));
-  unit.remove_prefix(std::min(unit.find_first_not_of(' '), unit.size()));
-  for (const auto& [name, factor] : units) {
-    const double bytes = number * factor;
-    if (error == std::errc() && unit == name && bytes >= 0 && bytes < 1e18)
-      return static_cast<std::uint64_t>(std::llround(bytes));
-  }
-  throw std::invalid_argument("'" + text + "' is no size: a number and B, KiB, MiB, GiB, TiB, MB, GB or TB, as in 50GiB");
-}
-
-std::string text_of_bytes(std::uint64_t bytes) {
-  constexpr std::array<const char*, 5> units = {"B", "KiB", "MiB", "GiB", "TiB"};
-  auto value = static_cast<double>(bytes);
-  std::size_t unit = 0;
-  for (; value >= 1024 && unit + 1 < units.size(); ++unit) value /= 1024;
-  std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), unit == 0 ? "%.0f %s" : "%.1f %s", value, units[unit]);
-  return text.data();
 }
 
 }  // namespace bedflow::server

@@ -38,8 +38,4 @@ void require_room(const v1::Quota& quota, const Holding& now, const std::string&
 // Why one more may not run now; empty: it may.
 std::string why_not_run(const v1::Quota& quota, std::uint64_t running, const std::string& whose);
 
-// "50GiB", "200 MB", "4096". Throws std::invalid_argument.
-std::uint64_t bytes_of_text(const std::string& text);
-std::string text_of_bytes(std::uint64_t bytes);  // "12.3 GiB"
-
 }  // namespace bedflow::server

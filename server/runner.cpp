@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "attempt.h"
+#include "clock.h"
 #include "folder.h"
 #include "process.h"
 
@@ -73,14 +74,13 @@ bool wait_for_earlier(const JobFolder& folder, std::uint32_t epoch) {
 
 Launch engine_launch(const RunnerOptions& options) {
   Launch launch;
+  if (options.ranks > 1) launch.environment = {"OMPI_ALLOW_RUN_AS_ROOT=1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1"};
   if (options.ranks > 1 && !options.launcher.empty()) {
     std::istringstream words(options.launcher);
     launch.command.assign(std::istream_iterator<std::string>(words), {});
     launch.command.insert(launch.command.end(), {"-n", std::to_string(options.ranks)});
-    launch.environment = {"OMPI_ALLOW_RUN_AS_ROOT=1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1"};
   } else if (options.ranks > 1) {
     launch.command = {options.mpirun, "-n", std::to_string(options.ranks), "--oversubscribe", "--bind-to", "none"};
-    launch.environment = {"OMPI_ALLOW_RUN_AS_ROOT=1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1"};
     // Ranks that fill the machine leave it to others while they wait; a core to spare would make this a loss.
     if (options.ranks >= std::thread::hardware_concurrency()) launch.environment.emplace_back("OMPI_MCA_mpi_yield_when_idle=1");
   }
@@ -107,7 +107,7 @@ void write_exit(const JobFolder& folder, std::uint32_t epoch, int exit_code) {
   record.set_epoch(epoch);
   record.set_exit_code(exit_code);
   if (exit_code > 128) record.set_signal(exit_code - 128);
-  record.set_unix_nanos(std::chrono::nanoseconds(std::chrono::system_clock::now().time_since_epoch()).count());
+  record.set_unix_nanos(now_nanos());
   write_durably(folder.exit_record(epoch), record);
 }
 

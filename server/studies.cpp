@@ -60,6 +60,24 @@ void check_stop(const v1::StudySpec& spec, std::vector<v1::Fault>& faults) {
   added.set_text("is " + std::to_string(spec.stop().relative()) + "; allowed are above 0 to 1");
 }
 
+v1::StudySpec without_cases(v1::StudySpec spec) {
+  for (auto& point : *spec.mutable_points()) point.clear_case_();
+  return spec;
+}
+
+// The jobs that a study has made, its packing first.
+std::vector<std::string> jobs_of(const v1::Study& study) {
+  std::vector<std::string> jobs;
+  if (study.has_packing_job()) jobs.push_back(study.packing_job());
+  for (const auto& run : study.runs())
+    if (run.has_job() && !run.reused()) jobs.push_back(run.job());
+  return jobs;
+}
+
+bool uses(const v1::Study& study, const std::string& job) {
+  return study.packing_job() == job || std::ranges::any_of(study.runs(), [&](const auto& run) { return run.job() == job; });
+}
+
 std::uint64_t bytes_of(const fs::path& folder) {
   std::uint64_t bytes = 0;
   std::error_code gone;
@@ -74,11 +92,11 @@ Studies::Studies(Jobs& jobs, std::filesystem::path folder) : jobs_(jobs), folder
   for (const auto& entry : fs::directory_iterator(folder_)) {
     Kept kept;
     if (!is_study_id(entry.path().filename())) continue;
-    if (!read_message(entry.path() / "study.txtpb", kept.study) ||
-        !read_message(entry.path() / "spec.txtpb", *kept.study.mutable_spec())) {
+    if (!read_message(entry.path() / "study.txtpb", kept.study) || !read_message(entry.path() / "spec.txtpb", kept.spec)) {
       spdlog::error("the study in {} cannot be read and is left alone", entry.path().string());
       continue;
     }
+    *kept.study.mutable_spec() = without_cases(kept.spec);
     if (!kept.study.has_owner()) kept.study.set_owner(local_owner);  // of a time when there were no others
     studies_.emplace(kept.study.id(), std::move(kept));
   }
@@ -102,16 +120,14 @@ Studies::Kept& Studies::own_kept(const Caller& caller, const std::string& id) {
 }
 
 void Studies::store(const Kept& kept) const {
-  v1::Study without_spec = kept.study;
-  without_spec.clear_spec();
-  write_durably(folder_of(kept.study.id()) / "study.txtpb", without_spec);
+  write_durably(folder_of(kept.study.id()) / "study.txtpb", kept.study);
 }
 
 std::optional<v1::Study> Studies::earlier_answer(const Caller& caller, const v1::CreateStudyRequest& request) const {
   if (request.request_id().empty()) return std::nullopt;
   for (const auto& [id, kept] : studies_) {
     if (kept.study.request_id() != request.request_id() || kept.study.owner() != caller.owner) continue;
-    if (content_of(kept.study.spec()) == content_of(request.spec())) return kept.study;
+    if (content_of(kept.spec) == content_of(request.spec())) return kept.study;
     throw Refusal(Refused::request_id_reused,
                   "request id " + request.request_id() + " has been used for " + id + ", another study",
                   "bedflow study get " + id);
@@ -155,7 +171,8 @@ v1::Study Studies::create(const Caller& caller, const v1::CreateStudyRequest& re
   kept.study.set_created_unix_nanos(now_nanos());
   kept.study.set_request_id(request.request_id());
   kept.study.set_owner(caller.owner);
-  *kept.study.mutable_spec() = spec;
+  kept.spec = spec;
+  *kept.study.mutable_spec() = without_cases(spec);
   for (int i = 0; i < spec.points_size(); ++i) kept.study.add_runs();
   const std::lock_guard guard(mutex_);
   if (auto earlier = earlier_answer(caller, request)) return *earlier;
@@ -163,9 +180,7 @@ v1::Study Studies::create(const Caller& caller, const v1::CreateStudyRequest& re
   const fs::path draft = folder_ / ("draft-" + kept.study.id());
   fs::create_directories(draft);
   write_durably(draft / "spec.txtpb", spec);
-  v1::Study without_spec = kept.study;
-  without_spec.clear_spec();
-  write_durably(draft / "study.txtpb", without_spec);
+  write_durably(draft / "study.txtpb", kept.study);
   fs::rename(draft, folder_of(kept.study.id()));
   sync_folder(folder_);
   spdlog::info("{} is a study of {} runs", kept.study.id(), spec.points_size());
@@ -198,11 +213,7 @@ v1::ListStudiesResponse Studies::list() {
   for (const auto& [id, kept] : studies_) newest_first.push_back(&kept.study);
   std::ranges::sort(newest_first, std::greater(), &v1::Study::created_unix_nanos);
   v1::ListStudiesResponse response;
-  for (const auto* study : newest_first) {
-    v1::Study& added = *response.add_studies();
-    added = *study;
-    for (auto& point : *added.mutable_spec()->mutable_points()) point.clear_case_();
-  }
+  for (const auto* study : newest_first) *response.add_studies() = *study;
   return response;
 }
 
@@ -215,11 +226,7 @@ v1::Study Studies::cancel(const Caller& caller, const std::string& id) {
   found.study.set_state(v1::STUDY_CANCELLED);
   found.study.set_message("cancelled");
   store(found);
-  std::vector<std::string> jobs;
-  if (found.study.has_packing_job()) jobs.push_back(found.study.packing_job());
-  for (const auto& run : found.study.runs())
-    if (run.has_job() && !run.reused()) jobs.push_back(run.job());
-  for (const auto& job : jobs) {
+  for (const auto& job : jobs_of(found.study)) {
     try {
       jobs_.cancel(caller, job, false);
     } catch (const Refusal&) {  // it has ended
@@ -235,18 +242,10 @@ std::uint64_t Studies::remove(const Caller& caller, const std::string& id, bool 
     throw Refusal(Refused::wrong_state, "study " + id + " is running and cannot be deleted", "bedflow study cancel " + id);
   }
   const auto is_of_another = [&](const std::string& job) {
-    return std::ranges::any_of(studies_, [&](const auto& other) {
-      return other.first != id &&
-             (other.second.study.packing_job() == job ||
-              std::ranges::any_of(other.second.study.runs(), [&](const auto& run) { return run.job() == job; }));
-    });
+    return std::ranges::any_of(studies_, [&](const auto& other) { return other.first != id && uses(other.second.study, job); });
   };
-  std::vector<std::string> jobs;
-  if (found.study.has_packing_job()) jobs.push_back(found.study.packing_job());
-  for (const auto& run : found.study.runs())
-    if (run.has_job() && !run.reused()) jobs.push_back(run.job());
   std::uint64_t freed = 0;
-  for (const auto& job : jobs) {
+  for (const auto& job : jobs_of(found.study)) {
     if (!with_jobs || is_of_another(job)) continue;
     try {
       freed += jobs_.remove(caller, job);
@@ -259,6 +258,16 @@ std::uint64_t Studies::remove(const Caller& caller, const std::string& id, bool 
   sync_folder(folder_);
   studies_.erase(id);
   return freed;
+}
+
+std::set<std::string> Studies::jobs() {
+  const std::lock_guard guard(mutex_);
+  std::set<std::string> jobs;
+  for (const auto& [id, kept] : studies_) {
+    if (kept.study.has_packing_job()) jobs.insert(kept.study.packing_job());
+    for (const auto& run : kept.study.runs()) jobs.insert(run.job());
+  }
+  return jobs;
 }
 
 bool Studies::is_idle() {

@@ -8,6 +8,7 @@
 #include <map>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -25,13 +26,14 @@ class Studies {
   // Calls, from any thread. They throw Refusal.
   v1::Study create(const Caller& caller, const v1::CreateStudyRequest& request);
   v1::Study get(const std::string& id);  // with errors and front, as far as the runs have come
-  v1::ListStudiesResponse list();        // without cases, errors and front
+  v1::ListStudiesResponse list();        // without these
   v1::Study cancel(const Caller& caller, const std::string& id);
   std::uint64_t remove(const Caller& caller, const std::string& id, bool with_jobs);  // bytes that are free again
 
   // Submits runs that are missing, stops those whose intervals are narrow enough, ends studies. From one thread.
   void advance();
   bool is_idle();
+  std::set<std::string> jobs();  // of all studies: runs, packings, and what they reuse
 
  private:
   struct Run {  // what is known of a run that has ended; it does not change any more
@@ -39,7 +41,8 @@ class Studies {
     std::vector<Measured> quantities;
   };
   struct Kept {
-    v1::Study study;
+    v1::StudySpec spec;                // the whole, with every point's case
+    v1::Study study;                   // the specification in it has no cases: as it is told
     std::map<std::string, Run> ended;  // by job
   };
 

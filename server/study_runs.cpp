@@ -107,9 +107,10 @@ std::string Studies::create_job(const v1::Study& study, const std::string& name,
 // The reference's particles, seeded and settled: a job of one step, whose checkpoint of step 0 all runs start from.
 bool Studies::pack(Kept& kept) {
   v1::Study& study = kept.study;
-  v1::Case value = study.spec().points(static_cast<int>(study.spec().reference())).case_();
-  if (!study.spec().same_packing() || !value.has_particles()) return true;
+  const v1::Case& reference = kept.spec.points(static_cast<int>(kept.spec.reference())).case_();
+  if (!kept.spec.same_packing() || !reference.has_particles()) return true;
   if (!study.has_packing_job()) {
+    v1::Case value = reference;
     v1::CreateJobRequest probe;
     *probe.mutable_case_() = value;
     *probe.mutable_spec() = study.spec().job();
@@ -131,7 +132,7 @@ bool Studies::pack(Kept& kept) {
 }
 
 void Studies::submit(Kept& kept, int point) {
-  const v1::StudySpec& spec = kept.study.spec();
+  const v1::StudySpec& spec = kept.spec;
   v1::StudyRun& run = *kept.study.mutable_runs(point);
   const v1::Case& value = spec.points(point).case_();
   const std::string packing = spec.same_packing() && value.has_particles() ? kept.study.packing_job() : "";
@@ -174,7 +175,7 @@ void Studies::look_at(Kept& kept, int point) {
   run.clear_message();
   if (job.has_reason()) run.set_reason(job.reason());
   if (job.has_message()) run.set_message(job.message());
-  const double end = kept.study.spec().points(point).case_().time().end();
+  const double end = kept.spec.points(point).case_().time().end();
   run.set_done(job.state() == v1::SUCCEEDED ? 1 : job.progress().time() / end);
   if (job.state() != v1::RUNNING || !kept.study.spec().has_stop() || run.interval_met()) return;
   const Run so_far = results_of(kept, run);

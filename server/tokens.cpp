@@ -41,13 +41,16 @@ void require_sound(const v1::Token& token) {
   if (left <= left.zero() || left > longest_life) wrong("token.expires_unix_nanos is not between now and ten years from now");
 }
 
+[[noreturn]] void refuse_ended(const std::string& id) {
+  throw Refusal(Refused::token_ended, "the token " + printable(id) + " has been revoked or has expired while the call went on",
+                "ask an admin of the server for another: bedflow server token create");
+}
+
 }  // namespace
 
 void Caller::require_still_good() const {
   if (!token || token->holds()) return;
-  throw Refusal(Refused::token_ended,
-                "the token " + token->token.id() + " has been revoked or has expired while the call went on",
-                "ask an admin of the server for another: bedflow server token create");
+  refuse_ended(token->token.id());
 }
 
 Tokens::Tokens(std::filesystem::path file) : file_(std::move(file)) {
@@ -147,8 +150,7 @@ Shown Tokens::look_at(std::string_view authorization, Caller& caller) const {
 Caller Tokens::caller_of(const std::string& id) const {
   const auto known = find(id);
   if (known && known->holds()) return caller_with(known);
-  throw Refusal(Refused::token_ended, "the token " + printable(id) + " has been revoked or has expired while the call went on",
-                "ask an admin of the server for another: bedflow server token create");
+  refuse_ended(id);
 }
 
 }  // namespace bedflow::server

@@ -10,7 +10,7 @@ import unittest
 import unittest.mock
 
 import bedflow
-from bedflow.v1 import context_pb2, service_pb2
+from bedflow.v1 import access_pb2, context_pb2, service_pb2
 from google.protobuf import text_format
 from real_server import BIN, bed, wait_until
 from secure_server import SecureServer, SlowWay, make_certificates
@@ -220,7 +220,7 @@ class Start(unittest.TestCase):
 
 class PythonContexts(unittest.TestCase):
     def test_are_the_same_to_the_python_client(self):
-        token = server.token("alice", service_pb2.SUBMIT)
+        token = server.token("alice", access_pb2.SUBMIT)
         folder = pathlib.Path(tempfile.mkdtemp(dir=server.path))
         with unittest.mock.patch.dict("os.environ", XDG_CONFIG_HOME=str(folder)):
             self.assertEqual(bedflow.read_context().server, bedflow.default_address())
@@ -238,7 +238,7 @@ class PythonContexts(unittest.TestCase):
 class PythonClient(unittest.TestCase):
     def test_takes_authority_certificate_and_token(self):
         make_certificates(strict.keys, "--client", "python")
-        token = strict.token("alice", service_pb2.SUBMIT)
+        token = strict.token("alice", access_pb2.SUBMIT)
         pair = {"certificate": strict.keys / "python.pem", "key": strict.keys / "python.key"}
         with bedflow.connect(strict.network, ca=strict.keys / "ca.pem", token=token.file, **pair) as there:
             self.assertEqual(there.info().caller, "alice")
@@ -248,7 +248,7 @@ class PythonClient(unittest.TestCase):
         self.assertEqual(caught.exception.reason, "TOKEN_MISSING")
 
     def test_uses_no_token_and_no_key_that_others_can_read(self):
-        token = server.token("alice", service_pb2.READ)
+        token = server.token("alice", access_pb2.READ)
         token.file.chmod(0o640)
         with self.assertRaises(PermissionError):
             server.connect_as(token)

@@ -12,11 +12,11 @@ import unittest
 
 import bedflow
 import grpc
-from bedflow.v1 import fields_pb2, job_pb2, service_pb2, study_pb2
+from bedflow.v1 import access_pb2, fields_pb2, job_pb2, service_pb2, study_pb2
 from real_server import bed, wait_until
 from secure_server import OTHERS, SERVICE, SecureServer, make_certificates, outcome, path_of, reason_of
 
-READ, SUBMIT, ADMIN = service_pb2.READ, service_pb2.SUBMIT, service_pb2.ADMIN
+READ, SUBMIT, ADMIN = access_pb2.READ, access_pb2.SUBMIT, access_pb2.ADMIN
 OK, UNAUTHENTICATED, DENIED = grpc.StatusCode.OK, grpc.StatusCode.UNAUTHENTICATED, grpc.StatusCode.PERMISSION_DENIED
 
 
@@ -28,7 +28,7 @@ def setUpModule():
 
 def methods():
     """Every method that the server has, with the scope that its schema asks for."""
-    return {path_of(method): method.GetOptions().Extensions[service_pb2.needs] for method in SERVICE.methods} | OTHERS
+    return {path_of(method): method.GetOptions().Extensions[access_pb2.needs] for method in SERVICE.methods} | OTHERS
 
 
 def submit(token, case=None):
@@ -39,7 +39,7 @@ def submit(token, case=None):
 
 class EveryMethod(unittest.TestCase):
     def test_has_a_scope(self):
-        self.assertEqual([path for path, scope in methods().items() if scope == service_pb2.SCOPE_NONE], [])
+        self.assertEqual([path for path, scope in methods().items() if scope == access_pb2.SCOPE_NONE], [])
 
     def test_turns_away_who_shows_no_good_token(self):
         good, revoked, brief = server.token("alice", ADMIN), server.token("alice", ADMIN), server.token("alice", ADMIN, seconds=0.5)
@@ -67,7 +67,7 @@ class EveryMethod(unittest.TestCase):
         for scope in (READ, SUBMIT, ADMIN):
             channel = server.channel(server.token("alice", scope))
             for path, needed in methods().items():
-                with self.subTest(method=path, scope=service_pb2.Scope.Name(scope)):
+                with self.subTest(method=path, scope=access_pb2.Scope.Name(scope)):
                     code, message = outcome(channel, path)
                     self.assertNotEqual(code, UNAUTHENTICATED, message)
                     if scope < needed:
@@ -119,7 +119,7 @@ class Owners(unittest.TestCase):
         for method in SERVICE.methods:
             request = method.input_type._concrete_class()
             fields = request.DESCRIPTOR.fields_by_name
-            if method.GetOptions().Extensions[service_pb2.needs] != SUBMIT or "Study" in method.name:
+            if method.GetOptions().Extensions[access_pb2.needs] != SUBMIT or "Study" in method.name:
                 continue
             if "id" in fields:
                 request.id = self.job
@@ -166,13 +166,13 @@ class Owners(unittest.TestCase):
         case.monitors[1].averaging.bin = 0.01
         spec = study_pb2.StudySpec(name="two", axes=["nothing"], quantities=[{"monitor": "bed_height"}], same_packing=False,
                                               points=[{"values": [str(i)], "case": case} for i in range(2)])
-        stub, request = server.stub(self.alice), service_pb2.CreateStudyRequest(spec=spec, request_id="a-study-of-one")
+        stub, request = server.stub(self.alice), study_pb2.CreateStudyRequest(spec=spec, request_id="a-study-of-one")
         study = stub.CreateStudy(request).id
         self.assertNotEqual(server.stub(self.bob).CreateStudy(request).owner, "alice", "a request id of another")
         self.assertEqual(stub.CreateStudy(request).id, study)
 
         def told(who=self.bob):
-            return server.stub(who).GetStudy(service_pb2.GetStudyRequest(id=study))
+            return server.stub(who).GetStudy(study_pb2.GetStudyRequest(id=study))
         self.assertTrue(wait_until(lambda: all(run.job for run in told().runs)))
         self.assertEqual(told().owner, "alice")
         self.assertEqual({server.local.GetJob(service_pb2.GetJobRequest(id=run.job)).owner for run in told().runs}, {"alice"})
@@ -180,10 +180,10 @@ class Owners(unittest.TestCase):
             with self.assertRaises(grpc.RpcError) as caught:
                 getattr(server.stub(self.bob), name)(SERVICE.methods_by_name[name].input_type._concrete_class(id=study))
             self.assertEqual((caught.exception.code(), reason_of(caught.exception)), (DENIED, "NOT_OWNER"))
-        stub.CancelStudy(service_pb2.CancelStudyRequest(id=study))
-        for other in server.local.ListStudies(service_pb2.ListStudiesRequest()).studies:
+        stub.CancelStudy(study_pb2.CancelStudyRequest(id=study))
+        for other in server.local.ListStudies(study_pb2.ListStudiesRequest()).studies:
             if other.owner == "bob":
-                server.stub(self.admin).CancelStudy(service_pb2.CancelStudyRequest(id=other.id))
+                server.stub(self.admin).CancelStudy(study_pb2.CancelStudyRequest(id=other.id))
 
     def test_do_not_meet_in_their_request_ids(self):
         request = service_pb2.CreateJobRequest(case=bedflow.read_case(bed(end=0.002)), request_id="the-same-id")
@@ -241,11 +241,11 @@ class Tokens(unittest.TestCase):
         admin = server.token("carol", ADMIN)
         stub = server.stub(admin)
         made = server.token("dave", READ)
-        self.assertIn(made.id, [token.id for token in stub.ListTokens(service_pb2.ListTokensRequest()).tokens])
-        self.assertEqual([token for token in stub.ListTokens(service_pb2.ListTokensRequest()).tokens if token.secret_sha256], [])
-        self.assertEqual([token.id for token in stub.RevokeToken(service_pb2.RevokeTokenRequest(owner="dave")).tokens], [made.id])
+        self.assertIn(made.id, [token.id for token in stub.ListTokens(access_pb2.ListTokensRequest()).tokens])
+        self.assertEqual([token for token in stub.ListTokens(access_pb2.ListTokensRequest()).tokens if token.secret_sha256], [])
+        self.assertEqual([token.id for token in stub.RevokeToken(access_pb2.RevokeTokenRequest(owner="dave")).tokens], [made.id])
         with self.assertRaises(grpc.RpcError) as caught:
-            stub.RevokeToken(service_pb2.RevokeTokenRequest(id=made.id))
+            stub.RevokeToken(access_pb2.RevokeTokenRequest(id=made.id))
         self.assertEqual(reason_of(caught.exception), "TOKEN_NOT_FOUND")
 
     def test_leave_no_secret_anywhere(self):

@@ -13,18 +13,10 @@ from real_server import BIN, RealServer, bed, wait_until
 from terminal import Session
 
 
-def submitted(server, *options, **case):
-    file = server.path / "case.txtpb"
-    file.write_text(bed(**case))
-    answer = server.client("submit", file, *options)
-    assert answer.returncode == 0, answer.stderr
-    return answer.stdout.strip()
-
-
 def setUpModule():
     global server, job
     server = unittest.enterModuleContext(RealServer("--housekeeping-seconds", "0.2"))
-    job = submitted(server, "--checkpoint-steps", 20, end=100)
+    job = server.submitted("--checkpoint-steps", 20, end=100)
     assert wait_until(lambda: "RUNNING" in server.client("get", job).stdout)
 
 
@@ -76,7 +68,7 @@ class Top(unittest.TestCase):
             self.assertEqual(termios.tcgetattr(session.terminal), session.settings)
 
     def test_ctrl_c_ends_it_and_all_jobs_are_shown_on_demand(self):
-        done = submitted(server)
+        done = server.submitted()
         server.client("wait", done)
         with at_terminal("top", "--interval", "0.2") as session:
             session.frame(lambda lines: any(job in line for line in lines) and not any(done in line for line in lines))

@@ -10,14 +10,6 @@ import unittest
 from real_server import BIN, RealServer, bed, wait_until
 
 
-def submitted(server, *options, **case):
-    file = server.path / "case.txtpb"
-    file.write_text(bed(**case))
-    answer = server.client("submit", file, *options)
-    assert answer.returncode == 0, answer.stderr
-    return answer.stdout.strip()
-
-
 def shown(server, job):
     answer = server.client("get", job, "-o", "json")
     assert answer.returncode == 0, answer.stderr + (server.path / "server.log").read_text()[-2000:]
@@ -55,8 +47,8 @@ def as_version_2(catalogue):
 class Upgrade(unittest.TestCase):
     def test_the_new_server_takes_up_the_running_engines_on_the_old_catalogue(self):
         with RealServer("--slots", "1") as server:
-            job = submitted(server, end=100)
-            waiting = submitted(server)
+            job = server.submitted(end=100)
+            waiting = server.submitted()
             self.assertTrue(wait_until(lambda: int(shown(server, job).get("progress", {}).get("step", 0)) > 5))
             server.stop()
             before = int(shown_from_folder(server, job))
@@ -102,9 +94,9 @@ class Backup(unittest.TestCase):
 
     def test_a_running_server_is_copied_and_an_empty_machine_goes_on_from_the_copy(self):
         with RealServer() as server:
-            done = submitted(server)
+            done = server.submitted()
             self.assertEqual(server.client("wait", done, "--timeout", 50).returncode, 0)
-            running = submitted(server, "--checkpoint-steps", 5, end=100)
+            running = server.submitted("--checkpoint-steps", 5, end=100)
             self.assertTrue(wait_until(lambda: int(shown(server, running).get("progress", {}).get("step", 0)) > 20))
             first = backup(server.path / "data", self.path / "copy")
             self.assertEqual(first.returncode, 0, first.stderr)
@@ -135,7 +127,7 @@ class Backup(unittest.TestCase):
 
     def test_what_is_deleted_goes_from_the_copy_and_links_stay_links(self):
         with RealServer() as server:
-            gone, kept = submitted(server), submitted(server)
+            gone, kept = server.submitted(), server.submitted()
             for job in (gone, kept):
                 server.client("wait", job, "--timeout", 50)
             step = json.loads(server.client("checkpoint", "list", kept, "-o", "json").stdout)[0]["step"]

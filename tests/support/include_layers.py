@@ -34,7 +34,7 @@ ALLOWED = {
 RESERVED = [
     (r"mpi\.h", r"engine/parallel/comm\.cpp", "MPI is in parallel/comm.cpp and nowhere else"),
     (r"(hdf5|H5\w*)\.h", r"engine/checkpoint/.*", "HDF5 is in engine/checkpoint/ and nowhere else"),
-    (r"bedflow/v1/case\.pb\.h|case_file\.h", r"(engine/case|proto|server|client|tests)/.*",
+    (r"bedflow/v1/case(_\w+)?\.pb\.h|case_file\.h", r"(engine/case|proto|server|client|tests)/.*",
      "the engine knows the case's message in engine/case/ only"),
     (r"bedflow/v1/(job|results|fields)\.pb\.h|(record_log|statistics_file)\.h", r"(engine/report|proto|server|client|tests)/.*",
      "the engine knows the job folder's messages in engine/report/ only"),

@@ -131,6 +131,14 @@ class RealServer:
         return subprocess.run([BIN / "bedflow", *map(str, words), "--server", self.address], capture_output=True, text=True, timeout=60,
                               stdin=subprocess.DEVNULL, **options)
 
+    def submitted(self, *options, **case):
+        """The id of a job of bed(**case), submitted as users do."""
+        file = self.path / "case.txtpb"
+        file.write_text(bed(**case))
+        answer = self.client("submit", file, *options)
+        assert answer.returncode == 0, answer.stderr
+        return answer.stdout.strip()
+
 
 def wait_until(condition, seconds=30):
     """True as soon as it holds; false when it does not within the time."""

@@ -11,13 +11,13 @@ import time
 
 import bedflow
 import grpc
-from bedflow.v1 import service_pb2, service_pb2_grpc
+from bedflow.v1 import access_pb2, service_pb2, service_pb2_grpc
 from real_server import RealServer
 
 CERTIFICATES = pathlib.Path(__file__).parents[2] / "deploy/certificates.sh"
 SERVICE = service_pb2.DESCRIPTOR.services_by_name["JobService"]
-OTHERS = {"/grpc.health.v1.Health/Check": service_pb2.READ, "/grpc.health.v1.Health/Watch": service_pb2.READ,
-          "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo": service_pb2.READ}
+OTHERS = {"/grpc.health.v1.Health/Check": access_pb2.READ, "/grpc.health.v1.Health/Watch": access_pb2.READ,
+          "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo": access_pb2.READ}
 
 
 def path_of(method):
@@ -58,13 +58,13 @@ class SecureServer(RealServer):
     def token(self, owner, scope, seconds=3600.0):
         identity, secret = secrets.token_hex(6), secrets.token_hex(32)
         self.secrets.append(secret)
-        self.local.CreateToken(service_pb2.CreateTokenRequest(token=service_pb2.Token(
+        self.local.CreateToken(access_pb2.CreateTokenRequest(token=access_pb2.Token(
             id=identity, owner=owner, scope=scope, secret_sha256=hashlib.sha256(secret.encode()).digest(),
             expires_unix_nanos=time.time_ns() + int(seconds * 1e9))))
         return Token(self.keys, identity, secret)
 
     def revoke(self, token):
-        self.local.RevokeToken(service_pb2.RevokeTokenRequest(id=token.id))
+        self.local.RevokeToken(access_pb2.RevokeTokenRequest(id=token.id))
 
     def channel(self, token=None, ca=None, certificate=None):
         """A new connection. token: what is shown, a Token or any text; certificate: the name of one in the server's keys."""
