@@ -8,7 +8,10 @@
 
 #include "cases/ready_cases.h"
 #include "connection.h"
+#include "reproduction.h"
+#include "study_report.h"
 #include "terminal.h"
+#include "vary.h"
 
 namespace bedflow::client {
 
@@ -119,6 +122,12 @@ class Server {
     for (const auto& one : answer.series()) all.push_back({one.monitor().name(), one.monitor().meaning()});
     return all;
   }
+  Candidates studies() const {
+    Candidates all;
+    const auto answer = ask(&Stub::ListStudies, v1::ListStudiesRequest());
+    for (const auto& one : answer.studies()) all.push_back({one.id(), one.spec().name() + ", " + study_state_name(one.state())});
+    return all;
+  }
   Candidates quantities(const std::string& job) const {
     v1::GetCheckpointRequest request;
     request.mutable_name()->set_job(job);
@@ -162,6 +171,18 @@ Candidates contexts() {
   return all;
 }
 
+Candidates axes() {
+  Candidates all;
+  for (const auto& knob : knobs()) all.push_back({knob.name, knob.meaning});
+  return all;
+}
+
+Candidates beds() {
+  Candidates all;
+  for (const auto& name : published_conditions()) all.push_back({name, ""});
+  return all;
+}
+
 // By the option's name: the same name means the same thing in every verb.
 Candidates values_of(const CLI::Option& option, const Place& place, const std::string& current) {
   const std::string& name = option.get_single_name();
@@ -170,10 +191,13 @@ Candidates values_of(const CLI::Option& option, const Place& place, const std::s
   if (name == "axis") return {{"x", ""}, {"y", ""}, {"z", ""}};
   if (name == "state" || name == "for") return states();
   if (name == "case" || name == "diff" || (name == "name" && place.verb->get_name() == "init")) return named(ready_cases());
-  if (name == "preset") return named(ready_presets());
+  if (name == "preset" || name == "presets") return named(ready_presets());
+  if (name == "bed") return beds();
+  if (name == "vary") return axes();
   if (name == "shell") return {{"bash", ""}, {"zsh", ""}, {"fish", ""}};
   if (name == "context" || (name == "name" && place.verb->get_parent()->get_name() == "context")) return contexts();
   const Server server(place.server);
+  if (name == "study") return server.studies();
   if (name == "job" || name == "start-from")
     return option.get_type_name().find("@STEP") == std::string::npos ? server.jobs() : server.checkpoints(current);
   if (job().empty()) return {};
@@ -214,15 +238,15 @@ Completion complete(CLI::App& app, const std::string& line, const ServerChoice& 
     for (auto& one : completion.candidates) one.text.insert(0, before);
   } else if (place.current.starts_with('-')) {
     add_options(place, completion);
-  } else if (const auto verbs = place.verb->get_subcommands({}); !verbs.empty()) {
-    for (const auto* verb : verbs) {
-      if (!verb->get_group().empty()) completion.candidates.push_back({verb->get_name(), verb->get_description()});
-    }
   } else {
     const auto positionals = std::as_const(*place.verb).get_options([](const CLI::Option* one) { return one->get_positional(); });
     const auto index = std::min(place.words.size(), positionals.empty() ? 0 : positionals.size() - 1);
     const bool is_over = positionals.empty() || (index < place.words.size() && positionals.back()->get_expected_max() <= 1);
     if (!is_over) add_values(*positionals[index], place, place.current, completion);
+    for (const auto* verb : place.verb->get_subcommands({})) {
+      if (place.words.empty() && !verb->get_group().empty())
+        completion.candidates.push_back({verb->get_name(), verb->get_description()});
+    }
   }
   std::erase_if(completion.candidates, [&](const auto& one) { return !one.text.starts_with(place.current); });
   return completion;

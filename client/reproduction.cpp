@@ -11,15 +11,22 @@
 
 namespace bedflow::client {
 
+std::vector<std::string> published_conditions() {
+  std::vector<std::string> names;
+  for (const auto& one : ready_cases()) {
+    if (one.description.starts_with("short for")) continue;
+    for (const char* bed : {"goldschmidt", "mueller", "link", "sscp"})
+      if (one.name.starts_with(bed)) names.emplace_back(one.name);
+  }
+  return names;
+}
+
 std::vector<std::string> conditions_of(const std::string& bed) {
   std::vector<std::string> conditions;
   std::string known;
-  for (const auto& one : ready_cases()) {
-    const std::string name(one.name);
-    if (one.description.starts_with("short for")) continue;
+  for (const auto& name : published_conditions()) {
     if (name == bed || name.starts_with(bed + "-")) conditions.push_back(name);
-    for (const char* published : {"goldschmidt", "mueller", "link", "sscp"})
-      if (name.starts_with(published)) known += (known.empty() ? "" : ", ") + name;
+    known += (known.empty() ? "" : ", ") + name;
   }
   if (conditions.empty())
     throw Failure(Exit::usage, "there is no published bed \"" + bed + "\"",

@@ -15,7 +15,8 @@ struct Averaging {
   std::uint32_t bins = 0;
 };
 
-// The ready cases of a bed: of "goldschmidt" all its conditions, of "goldschmidt-1.5" this one. Throws Failure with those there
+std::vector<std::string> published_conditions();  // ready cases: "goldschmidt-1.5", "mueller"
+// Those of a bed: of "goldschmidt" all its conditions, of "goldschmidt-1.5" this one. Throws Failure with those there
 // are.
 std::vector<std::string> conditions_of(const std::string& bed);
 // A run of each condition with each preset, every averaged monitor by this averaging, ended with its last bin. Every run packs

@@ -152,6 +152,7 @@ class Jobs {
   Holding holding(const std::string& owner) const;        // empty: of all
   void require_quota(const std::string& owner) const;
   std::string why_not_start(const std::string& owner) const;
+  IsHeld is_held() const;
   static void count_time(JobRecord& record, std::int64_t until);  // of the attempt that ended then
   static void add_time_so_far(v1::Job& job);                      // of the attempt that runs
   void start(JobRecord record, std::unique_lock<std::mutex>& guard);

@@ -230,4 +230,10 @@ std::vector<pid_t> session_members(pid_t session) {
   return members;
 }
 
+std::string host_name() {
+  std::array<char, 256> name{};
+  ::gethostname(name.data(), name.size() - 1);
+  return name.data();
+}
+
 }  // namespace bedflow::server

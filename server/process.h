@@ -57,5 +57,6 @@ int wait_for_exit(pid_t child);  // exit code, or 128 + signal
 std::optional<std::uint64_t> start_ticks(pid_t process);
 std::string command_line(pid_t process);            // each word ends with a zero byte; empty when there is no such process
 std::vector<pid_t> session_members(pid_t session);  // zombies left out
+std::string host_name();                            // of this machine
 
 }  // namespace bedflow::server

@@ -72,8 +72,7 @@ std::string Queue::lacks(const std::string& executor, const Waiting& job, const 
   return text;
 }
 
-std::optional<std::string> Queue::next(const std::map<std::string, Use>& uses,
-                                       const std::function<bool(const std::string& owner)>& is_held) const {
+std::optional<std::string> Queue::next(const std::map<std::string, Use>& uses, const IsHeld& is_held) const {
   for (const auto& [executor, line] : lines_) {
     const auto use = uses.find(executor);
     for (const auto& [place, job] : line) {
@@ -85,7 +84,7 @@ std::optional<std::string> Queue::next(const std::map<std::string, Use>& uses,
   return std::nullopt;
 }
 
-std::string Queue::reason(const std::string& id, const std::map<std::string, Use>& uses) const {
+std::string Queue::reason(const std::string& id, const std::map<std::string, Use>& uses, const IsHeld& is_held) const {
   const auto found = places_.find(id);
   if (found == places_.end()) return {};
   const std::string& executor = found->second.first;
@@ -99,7 +98,7 @@ std::string Queue::reason(const std::string& id, const std::map<std::string, Use
   std::ptrdiff_t ahead = 0;
   const Waiting* first = nullptr;
   for (auto other = line.begin(); other != self && ahead < most_counted; ++other) {
-    if (seconds_until(other->second.not_before) > 0) continue;
+    if (seconds_until(other->second.not_before) > 0 || is_held(other->second.owner)) continue;
     if (!first) first = &other->second;
     ++ahead;
   }

@@ -27,6 +27,10 @@ struct Use {
   double memory_bytes = 0;
 };
 
+// Whether a quota, say, keeps an owner's jobs from starting.
+using IsHeld = std::function<bool(const std::string& owner)>;
+inline bool nobody_is_held(const std::string&) { return false; }
+
 class Queue {
  public:
   explicit Queue(Capacities capacities) : capacities_(std::move(capacities)) {}
@@ -38,12 +42,11 @@ class Queue {
   std::uint32_t size_of(const std::string& executor) const;
 
   // The next that can start now; nothing when the first of each line lacks something.
-  // Jobs of an owner that is held, by a quota say, are passed over.
-  std::optional<std::string> next(
-      const std::map<std::string, Use>& uses,
-      const std::function<bool(const std::string& owner)>& is_held = [](const std::string&) { return false; }) const;
+  // Jobs of an owner that is held are passed over.
+  std::optional<std::string> next(const std::map<std::string, Use>& uses, const IsHeld& is_held = nobody_is_held) const;
   // What it waits for, for people: "2 of 4 slots (1 is free)". Empty: nothing, or it does not wait.
-  std::string reason(const std::string& id, const std::map<std::string, Use>& uses) const;
+  std::string reason(const std::string& id, const std::map<std::string, Use>& uses,
+                     const IsHeld& is_held = nobody_is_held) const;
   std::vector<std::string> first(std::size_t most) const;
 
  private:

@@ -34,7 +34,16 @@ std::string Jobs::waits_for(const JobRecord& record) const {
   if (const auto live = live_.find(record.job.id()); live != live_.end()) return live->second.waits_for;
   if (!is_waiting(record.job.state())) return {};
   auto held = why_not_start(record.job.owner());
-  return held.empty() ? queue_.reason(record.job.id(), uses()) : held;
+  return held.empty() ? queue_.reason(record.job.id(), uses(), is_held()) : held;
+}
+
+// Each owner is asked about once.
+IsHeld Jobs::is_held() const {
+  return [this, held = std::make_shared<std::map<std::string, bool>>()](const std::string& owner) {
+    const auto [known, is_new] = held->try_emplace(owner);
+    if (is_new) known->second = !why_not_start(owner).empty();
+    return known->second;
+  };
 }
 
 // Watchers hear when a waiting job's reason has changed; not at every step of the queue.

@@ -45,12 +45,6 @@ bool claim(const JobFolder& folder, std::uint32_t epoch) {
   return file >= 0;
 }
 
-std::string host_name() {
-  std::array<char, 256> name{};
-  ::gethostname(name.data(), name.size() - 1);
-  return name.data();
-}
-
 // On another node the engine of an attempt that has been given up may not have noticed yet. False: it never does.
 bool wait_for_earlier(const JobFolder& folder, std::uint32_t epoch) {
   constexpr auto stillness = 3s, patience = 60s;

@@ -190,13 +190,7 @@ void Jobs::store_end(JobRecord& record, Ending ending, bool is_nobodys_fault, bo
 }
 
 std::optional<JobRecord> Jobs::next_to_start() {
-  std::map<std::string, bool> held;  // by owner: asked once each
-  const auto is_held = [&](const std::string& owner) {
-    const auto [known, is_new] = held.try_emplace(owner);
-    if (is_new) known->second = !why_not_start(owner).empty();
-    return known->second;
-  };
-  const auto id = queue_.next(uses(), is_held);
+  const auto id = queue_.next(uses(), is_held());
   return id ? catalogue_.find(*id) : std::nullopt;
 }
 

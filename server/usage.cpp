@@ -22,7 +22,7 @@ constexpr auto longest_known = 10min;  // a folder that seems unchanged is looke
 // Resident memory of a job's newest attempt on this machine.
 std::uint64_t memory_of(const JobFolder& folder, std::uint32_t epoch) {
   v1::Runner runner;
-  if (!read_message(folder.runner(epoch), runner)) return 0;
+  if (!read_message(folder.runner(epoch), runner) || runner.host() != host_name()) return 0;
   static const auto page = static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
   std::uint64_t bytes = 0;
   for (const pid_t process : session_members(static_cast<pid_t>(runner.pid()))) {

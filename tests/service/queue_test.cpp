@@ -58,6 +58,7 @@ TEST_F(Line, WhatIsLackingIsTold) {
   EXPECT_EQ(queue.reason("a", uses), "3 of 4 slots (2 are free) and 900 MiB of memory (800 MiB of 1.0 GiB are free)");
   EXPECT_EQ(queue.reason("b", uses), "its turn after a, which waits for " + queue.reason("a", uses));
   EXPECT_EQ(queue.reason("a", {}), "");
+  EXPECT_EQ(queue.reason("b", uses, [](const std::string&) { return true; }), "") << "one ahead that is held is not waited for";
 }
 
 TEST_F(Line, OneWhosePauseIsNotOverIsPassed) {

@@ -118,6 +118,9 @@ class Completion(unittest.TestCase):
         self.assertIn("bed_height", self.candidates(f"bedflow stats {job} "))
         self.assertIn("usage", self.candidates("bedflow server "))
         self.assertEqual(self.candidates(f"bedflow get {job} "), [])
+        self.assertEqual(self.candidates("bedflow reproduce goldschmidt-2"), ["goldschmidt-2"])
+        self.assertIn("substeps", self.candidates("bedflow study mueller --vary sub"))
+        self.assertEqual([one for one in self.candidates("bedflow study ") if one in ("mueller", "list")], ["mueller", "list"])
         self.assertTrue(wait_until(lambda: self.candidates(f"bedflow checkpoint get {job}@")))
         self.assertTrue(all(one.startswith(f"{job}@") for one in self.candidates(f"bedflow checkpoint get {job}@")))
 
