@@ -191,7 +191,7 @@ void Simulation::advance_particles(double dt) {
 void Simulation::pull_anew() {
   coupling_->transfer.locate(dem_->particles());
   find_drag();
-  coupling_->transfer.pull(gas_->state, dem_->particles());
+  coupling_->transfer.pull(dem_->particles());
 }
 
 bool Simulation::finished() const {

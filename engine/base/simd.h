@@ -54,6 +54,9 @@ inline double min(double a, double b) {  // a when b is not a number
 inline double max(double a, double b) {
   return b > a ? b : a;
 }
+inline double floor(double value) {
+  return std::floor(value);
+}
 inline double select(bool condition, double yes, double no) {
   return condition ? yes : no;
 }
@@ -75,6 +78,15 @@ P min(P a, P b) {
 template <PackLike P>
 P max(P a, P b) {
   return b > a ? b : a;
+}
+template <PackLike P>
+P floor(P value) {
+#if defined(__AVX512F__) && defined(__AVX512DQ__) && defined(__AVX512VL__)
+  if constexpr (lanes_of<P> == 8) return std::bit_cast<P>(_mm512_floor_pd(std::bit_cast<__m512d>(value)));
+#endif
+  P result;
+  for (int l = 0; l < lanes_of<P>; ++l) result[l] = std::floor(value[l]);
+  return result;
 }
 template <class Mask, PackLike P>
 P select(Mask condition, P yes, P no) {

@@ -50,6 +50,7 @@ Transfer::Transfer(const Decomposition& decomposition, const Grid& grid, Halo& h
       gradient_(grid),
       buoyancy_share_(grid, 1) {
   for (auto& shares : shares_) shares.resize(grid.size());
+  for (auto& pulls : pulls_) pulls.resize(grid.size());
   if (const auto* gaussian = std::get_if<Gaussian>(&setup.kernel)) {
     smoothing_.emplace(grid, lattices_, halo, gaussian->deviation(setup.diameter));
     smooth_velocity_ = FaceField(grid);
@@ -90,10 +91,7 @@ double Transfer::deposit_volume(const ParticleStore& particles, Field& fraction)
         for (std::size_t p = 0; p < particles.owned; ++p) {
           const double share = sizes_.volume_of(p) / grid_.cell_volume();
           const auto shares = stencils[p];
-          const double* x = stencils.x_shares(shares, cell_centres);
-          stencils.each_row(shares, cell_centres, [&](std::ptrdiff_t at, double weight) {
-            for (int q = 0; q < points; ++q) solids[at + q] += share * weight * x[q];
-          });
+          stencils.template spread<1>(shares, cell_centres, {share}, solids);
         }
       },
       stencils_);
@@ -208,12 +206,7 @@ void Transfer::spread(const ParticleStore& particles, Exchange& exchange) {
           }
           for (int d = 0; d < 3; ++d) {
             if (!lattices_.has_faces(d)) continue;
-            Share along[points];
-            for (int q = 0; q < points; ++q) along[q] = stencils.x_shares(shares, d)[q] * Share{b, momentum[d], felt * share, 0};
-            Share* to = shares_[d].data();
-            stencils.each_row(shares, d, [&](std::ptrdiff_t at, double weight) {
-              for (int q = 0; q < points; ++q) to[at + q] += weight * along[q];
-            });
+            stencils.template spread<4>(shares, d, {b, momentum[d], felt * share, 0}, &shares_[d].data()->drag);
           }
         }
       },
@@ -223,9 +216,9 @@ void Transfer::spread(const ParticleStore& particles, Exchange& exchange) {
     Share* shares = shares_[d].data();
     lattices_.each_row(d, [&](std::ptrdiff_t first, int n) {
       for (auto at = first; at < first + n; ++at) {
-        drags[at] = shares[at][0];
-        momenta[at] = shares[at][1];
-        solids[at] = shares[at][2];
+        drags[at] = shares[at].drag;
+        momenta[at] = shares[at].drag_momentum;
+        solids[at] = shares[at].solids;
         shares[at] = Share{};
       }
     });
@@ -290,25 +283,31 @@ void Transfer::deposit_drag(const ParticleStore& particles, const Interval& step
 
 void Transfer::sample(const GasState& gas, ParticleStore& particles) {
   const PhaseTimer::Scope scope(timer_, Phase::sample, particles.owned);
-  for (int d = 0; d < 3; ++d)
+  const FaceField& velocity = felt_velocity(gas.velocity);
+  for (int d = 0; d < 3; ++d) {
+    double* gradient = gradient_.data();
     lattices_.each_owned_row(d, [&](Int3 first, int n) {
       const std::ptrdiff_t c = grid_.index(first[0], first[1], first[2]);
-      double* gradient = gradient_[d].data();
       const double* share = buoyancy_share_[d].data();
       for (auto at = c; at < c + n; ++at) gradient[at] = share[at] * gradient_at(gas, d, at);
     });
-  if (smoothing_) {
-    smoothing_->apply(gradient_);
-  } else {
-    halo_.fill(gradient_);
+    if (smoothing_) {
+      smoothing_->apply(gradient_, d);
+    } else {
+      halo_.fill(gradient_);
+    }
+    const double* u = velocity[d].data();
+    Pull* pulls = pulls_[d].data();
+    lattices_.each_row(d, [=](std::ptrdiff_t first, int n) {
+      for (auto at = first; at < first + n; ++at) pulls[at] = {u[at], gradient[at]};
+    });
   }
-  pull(gas, particles);
+  pull(particles);
   if (relaxes_) std::visit([&](const auto& scheme) { respond(scheme, particles); }, setup_.scheme);
 }
 
 // −𝒱∇p + b (U − V) at the places of the particles.
-void Transfer::pull(const GasState& gas, ParticleStore& particles) {
-  const FaceField& velocity = felt_velocity(gas.velocity);
+void Transfer::pull(ParticleStore& particles) {
   std::visit(
       [&](const auto& stencils) {
         for (std::size_t p = 0; p < particles.owned; ++p) {
@@ -317,8 +316,10 @@ void Transfer::pull(const GasState& gas, ParticleStore& particles) {
           for (int d = 0; d < 3; ++d) {
             double u = 0, slope = 0;
             if (lattices_.has_faces(d)) {
-              u = stencils.sum(shares, d, velocity[d].data());
-              slope = stencils.sum(shares, d, gradient_[d].data());
+              const auto felt = stencils.template gathered<2>(shares, d, &pulls_[d].data()->velocity);
+              const double* x = stencils.x_shares(shares, d);
+              u = felt.sum(x, 0);
+              slope = felt.sum(x, 1);
             }
             particles.gas_force[p][d] = b * (u - particles.velocity(p)[d]) - sizes_.volume_of(p) * slope;
           }

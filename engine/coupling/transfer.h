@@ -93,13 +93,18 @@ class Transfer {
   void sample(const GasState& gas, ParticleStore& particles);
 
   // The same force at the particles' new places and velocities within the step, after locate and find_drag.
-  void pull(const GasState& gas, ParticleStore& particles);
+  void pull(ParticleStore& particles);
 
   // Sums what the gas lost in the step (from its own fields) and what the particles received. Collective.
   ExchangeBalance balance(const GasState& gas, const Exchange& exchange, const ParticleStore& particles) const;
 
  private:
-  using Share = double __attribute__((vector_size(32)));  // b, bV, solids of a face, and nothing: added as one
+  struct alignas(32) Share {  // of a face, added as one
+    double drag = 0, drag_momentum = 0, solids = 0, unused = 0;
+  };
+  struct alignas(16) Pull {  // on a face
+    double velocity = 0, gradient = 0;  // U, m/s, and ∇p, Pa/m, as the particles feel them
+  };
   // Of all particles alike, or one a particle.
   struct Sizes {
     std::vector<double> diameter, volume, mass;  // m, m³, kg
@@ -138,7 +143,8 @@ class Transfer {
   std::vector<double> slip_, fraction_, drag_, felt_;  // of each owned particle: |U − V|, ε, b, ψ
   Vec3 paid_;                                          // debts of this rank's particles that the gas pays in the step, N
   std::array<std::vector<Share>, 3> shares_;           // of the faces of each direction, in a field's order; 0 between sweeps
-  FaceField gradient_;                                 // ∇p as the particles feel it, Pa/m
+  std::array<std::vector<Pull>, 3> pulls_;             // on the faces of each direction, in a field's order
+  Field gradient_;                                     // ∇p of a direction on its way there
   FaceField buoyancy_share_;  // share of ∇p that acts on particles: 1 but where the floor limits the solids of a face
   FaceField smooth_velocity_;
 };

@@ -20,7 +20,7 @@ ConjugateGradients::ConjugateGradients(const Decomposition& decomposition, const
       preconditioned_(work[0]),
       direction_(work[1]),
       product_(work[2]),
-      row_sum_(grid.cells[0]) {
+      row_sum_(grid) {
   if (preconditioner == Preconditioner::multigrid) preconditioner_.emplace<Multigrid>(decomposition, grid);
   if (preconditioner == Preconditioner::incomplete_cholesky) preconditioner_.emplace<IncompleteCholesky>(grid);
 }
@@ -36,17 +36,17 @@ void ConjugateGradients::precondition(const SevenPoint& matrix, const Field& r, 
   else if (auto* cholesky = std::get_if<IncompleteCholesky>(&preconditioner_))
     cholesky->apply(matrix, r, preconditioned_);
   else
-    preconditioned_ = r;
+    for_rows(grid_, [&](auto c, int n) { std::copy_n(r.data() + c, n, preconditioned_.data() + c); });
 }
 
 double ConjugateGradients::dot(const Field& a, const Field& b) {
   const double *x = a.data(), *y = b.data();
   double* partial = row_sum_.clear();
-  for_rows(grid_, [=](auto c, int n) {
+  for_joined_rows(grid_, [=](auto c, int n) {
 #pragma GCC ivdep
     for (int i = 0; i < n; ++i) partial[i] += x[c + i] * y[c + i];
   });
-  return decomposition_.comm().sum(row_sum_.total());
+  return decomposition_.comm().sum(row_sum_.total(grid_.cells[0]));
 }
 
 void ConjugateGradients::subtract_mean(Field& field) {
@@ -55,7 +55,7 @@ void ConjugateGradients::subtract_mean(Field& field) {
   for_rows(grid_, [=](auto c, int n) {
     for (int i = 0; i < n; ++i) partial[i] += x[c + i];
   });
-  const double mean = decomposition_.comm().sum(row_sum_.total()) / cells();
+  const double mean = decomposition_.comm().sum(row_sum_.total(grid_.cells[0])) / cells();
   for_rows(grid_, [=](auto c, int n) {
     for (int i = 0; i < n; ++i) x[c + i] -= mean;
   });
@@ -67,7 +67,7 @@ double ConjugateGradients::multiply(const SevenPoint& matrix) {
   const double* p = direction_.data();
   double *product = product_.data(), *partial = row_sum_.clear();
   const std::ptrdiff_t sy = grid_.stride(1), sz = grid_.stride(2);
-  for_rows(grid_, [=](auto first, int n) {
+  for_joined_rows(grid_, [=](auto first, int n) {
 #pragma GCC ivdep
     for (int i = 0; i < n; ++i) {
       const std::ptrdiff_t c = first + i;
@@ -76,7 +76,7 @@ double ConjugateGradients::multiply(const SevenPoint& matrix) {
       partial[i] += p[c] * product[c];
     }
   });
-  return row_sum_.total();
+  return row_sum_.total(grid_.cells[0]);
 }
 
 ConjugateGradients::Result ConjugateGradients::solve(const SevenPoint& matrix, bool singular, Field& b, Field& solution,
@@ -111,7 +111,7 @@ ConjugateGradients::Result ConjugateGradients::solve(const SevenPoint& matrix, b
         partial[i] += r[c + i] * r[c + i];
       }
     });
-    squares = comm.sum(row_sum_.total());
+    squares = comm.sum(row_sum_.total(grid_.cells[0]));
     ++result.iterations;
   }
   if (singular) subtract_mean(solution);

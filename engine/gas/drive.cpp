@@ -3,7 +3,7 @@
 namespace bedflow {
 
 DrivenFlow::DrivenFlow(const Decomposition& decomposition, const Grid& grid, const GasSetup& setup)
-    : decomposition_(decomposition), grid_(grid), setup_(setup), row_sums_{RowSum(grid.cells[0]), RowSum(grid.cells[0])} {}
+    : decomposition_(decomposition), grid_(grid), setup_(setup), row_sums_{RowSum(grid), RowSum(grid)} {}
 
 void DrivenFlow::set_time(GasState& state, double time) {
   for (int d = 0; d < 3; ++d) {
@@ -29,7 +29,7 @@ void DrivenFlow::steer(GasState& state, const FaceField& conductance) {
         response[i] += response_of * through[c + i];
       }
     });
-    std::array<double, 2> sums{row_sums_[0].total(), row_sums_[1].total()};
+    std::array<double, 2> sums{row_sums_[0].total(grid_.cells[0]), row_sums_[1].total(grid_.cells[0])};
     decomposition_.comm().sum(sums);
     const double shift = *wanted_[d] - sums[0] / faces;
     for_rows(grid_, [=](auto c, int n) {

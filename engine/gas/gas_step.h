@@ -9,6 +9,7 @@
 #include "gas/panels.h"
 #include "gas/pressure.h"
 #include "gas/workspace.h"
+#include "grid/rows.h"
 
 namespace bedflow {
 
@@ -56,6 +57,7 @@ struct GasStep {
   Vec3 old_fall;
   GasBalance balance;
   double displacement = 0;  // Σ|∂ε/∂t| V, m³/s
+  std::array<RowSum, 2> row_sums;
 
  private:
   void conclude(MomentumOutcome& outcome) const;

@@ -26,8 +26,8 @@ Momentum::Momentum(const Decomposition& decomposition, const Grid& grid, Halo& h
       source_(work[7]),
       constant_(work[8]),
       mobility_(mobility),
-      row_sums_{RowSum(grid.cells[0] + 1), RowSum(grid.cells[0] + 1), RowSum(grid.cells[0] + 1)},
-      coupling_(static_cast<std::size_t>(grid.cells[0]) + 1),
+      row_sums_{RowSum(grid), RowSum(grid), RowSum(grid)},
+      largest_(grid),
       row_(static_cast<std::size_t>(grid.cells[0]) + 1),
       carry_(static_cast<std::size_t>(grid.cells[0]) + 1) {
   if (ghosts_of(setup.convection) > 1) correction_ = Field(grid);
@@ -59,7 +59,7 @@ double Momentum::begin_component(int d, const GasState& state, const Given& give
   double *local = diagonal_.data(), *constant = constant_.data(), *push = mobility_[d].data();
   double* unsound = row_sums_[0].clear();
   const auto forces = [=, this](Int3 from, Int3 to, double share) {  // share: of a cell that the control volume is
-    for_rows(grid_, from, to, [=](auto first, int n) {
+    for_volumes(d, from, to, [=](auto first, int n) {
       const auto row = [=](auto mass_at, auto force_at, auto gas_at) {
 #pragma GCC ivdep
         for (int i = 0; i < n; ++i) {
@@ -100,7 +100,7 @@ double Momentum::begin_component(int d, const GasState& state, const Given& give
     for_rows(grid_, first, end, [=](auto c, int n) { std::fill_n(push + c, n, 0.0); });
   }
   for (const std::ptrdiff_t face : panels_.closed[d]) constant[face] = push[face] = 0;  // no force counts there
-  return row_sums_[0].total();
+  return row_sums_[0].total(high_solved(d)[0] - low_solved(d)[0]);
 }
 
 // ρg ε u A through every face, ghosts included, and ∇·U in every cell of which both faces are at hand.
@@ -119,7 +119,7 @@ void Momentum::set_fluxes(const GasState& state) {
   const double rx = 1 / grid_.spacing.x, ry = 1 / grid_.spacing.y, rz = 1 / grid_.spacing.z;
   const std::ptrdiff_t sy = grid_.stride(1), sz = grid_.stride(2);
   double* divergence = divergence_.data();
-  for_rows(grid_, {-1, -1, -1}, grid_.cells, [=](auto c, int n) {
+  for_joined_rows(grid_, {-1, -1, -1}, grid_.cells, [=](auto c, int n) {
     for (auto i = c; i < c + n; ++i) divergence[i] = rx * (u[i + 1] - u[i]) + ry * (v[i + sy] - v[i]) + rz * (w[i + sz] - w[i]);
   });
 }
@@ -155,7 +155,7 @@ void Momentum::assemble_inside(int d, const double* p, double fall) {
   double* source = source_.data();
   Int3 from{0, 0, 0};
   from[d] = boundaries_.at(d, 0) ? 1 : 0;
-  for_rows(grid_, from, grid_.cells, [=](auto first, int n) {
+  for_volumes(d, from, grid_.cells, [=](auto first, int n) {
 #pragma GCC ivdep
     for (auto c = first; c < first + n; ++c) {
       low[c] = along + std::max(0.5 * (f[c - s] + f[c]), 0.0);
@@ -190,10 +190,9 @@ void Momentum::relax(int d, const GasState& state, Sums& sums) {
     const double n = grid_.global[t], diffusion = setup_.viscosity * grid_.cell_volume() / (grid_.spacing[t] * grid_.spacing[t]);
     fine += 2 * diffusion * (1 / n - 1 / (n * n));
   }
-  std::fill(coupling_.begin(), coupling_.end(), 0.0);
-  double* coupling = coupling_.data();
-  double *imbalance = row_sums_[0].clear(), *force = row_sums_[1].clear(), *throughput = row_sums_[2].clear();
-  for_rows(grid_, low_solved(d), high_solved(d), [=, this](auto first, int n) {
+  double *coupling = largest_.clear(), *imbalance = row_sums_[0].clear(), *force = row_sums_[1].clear(), *throughput = row_sums_[2].clear();
+  const Int3 low = low_solved(d), high = high_solved(d);
+  for_volumes(d, low, high, [=, this](auto first, int n) {
     const std::ptrdiff_t above = step_above(first, n);
 #pragma GCC ivdep
     for (int i = 0; i < n; ++i) {
@@ -216,10 +215,12 @@ void Momentum::relax(int d, const GasState& state, Sums& sums) {
       mobility[c] /= still;
     }
   });
-  sums.imbalance = row_sums_[0].total();
-  sums.force = row_sums_[1].total();
-  sums.coupling = *std::max_element(coupling_.begin(), coupling_.end());
-  sums.throughput = row_sums_[2].total() * grid_.face_area(d) / grid_.global[d];
+  for_gaps(grid_, low, high, [=](auto c, int n) { std::fill_n(mobility + c, n, 0.0); });  // nothing is solved there
+  const int solved = high[0] - low[0];
+  sums.imbalance = row_sums_[0].total(solved);
+  sums.force = row_sums_[1].total(solved);
+  sums.coupling = largest_.largest(solved);
+  sums.throughput = row_sums_[2].total(solved) * grid_.face_area(d) / grid_.global[d];
 }
 
 // A sweep takes the largest error down to `coupling` of what it was at least, and in the end to about its square.

@@ -76,6 +76,12 @@ class Momentum {
   void correct_along(const Scheme& scheme, int d, int t, const double* u);
   void relax(int d, const GasState& state, Sums& sums);
   void sweep(int d, int direction, double* u);
+  // For what is done to the control volumes of component d; on an outflow along x two kinds of them stand in a row.
+  template <class Row>
+  void for_volumes(int d, Int3 low, Int3 high, Row row) const {
+    if (d == 0 && (boundaries_.outflow(0, 0) || boundaries_.outflow(0, 1))) return for_rows(grid_, low, high, row);
+    for_joined_rows(grid_, low, high, row);
+  }
   std::ptrdiff_t step_above(std::ptrdiff_t row, int n) const;
   Int3 low_solved(int d) const;
   Int3 high_solved(int d) const;
@@ -96,7 +102,8 @@ class Momentum {
   Field& constant_;                  // of the source: ρg ε° V/Δt u° and the forces that do not change with U and p
   FaceField& mobility_;              // ε_b A until the diagonal is known
   std::array<RowSum, 3> row_sums_;
-  std::vector<double> coupling_, row_, carry_;
+  RowSum largest_;  // of couplings
+  std::vector<double> row_, carry_;
 };
 
 }  // namespace bedflow

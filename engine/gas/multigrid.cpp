@@ -27,8 +27,8 @@ void Multigrid::apply(const Field& r, double magnitude, Field& z) {
 // x = M⁻¹ b on level l.
 void Multigrid::cycle(std::size_t l) {
   Level& level = levels_[l];
+  if (l + 1 == levels_.size()) return solve_coarsest();
   start(level);
-  if (l + 1 == levels_.size()) return;  // one cell: solved
   Level& next = levels_[l + 1];
   if (l + 1 == gathered_) {
     gather(level, next);
@@ -43,63 +43,77 @@ void Multigrid::cycle(std::size_t l) {
   for (int n = level.half_sweeps; n-- > 0;) relax(level, n % 2);
 }
 
-// The first half sweep, of red cells, from x = 0.
-void Multigrid::start(Level& level) {
-  const Int3 n = level.cells;
-  for (int k = 0; k < n[2]; ++k)
-    for (int j = 0; j < n[1]; ++j) {
-      const std::ptrdiff_t row = level.index(0, j, k);
-      const float *inverse = level.inverse.data() + row, *b = level.b.data() + row;
-      float* x = level.x.data() + row;
-      const int odd = (j + k + level.parity) & 1;
-      for (int i = 0; i < n[0]; ++i) x[i] = ((i ^ odd) & 1) == 0 ? inverse[i] * b[i] : 0;
-    }
+void Multigrid::solve_coarsest() {
+  Level& level = levels_.back();
+  const std::size_t n = coarsest_.size();
+  std::fill(solution_.begin(), solution_.end(), 0.0f);
+  float* x = solution_.data();
+  for (std::size_t m = 0; m < n; ++m) {
+    const float b = level.b[coarsest_[m]], *row = inverse_.data() + m * n;
+    for (std::size_t i = 0; i < n; ++i) x[i] += b * row[i];
+  }
+  for (std::size_t m = 0; m < n; ++m) level.x[coarsest_[m]] = x[m];
 }
 
-// Cells of one colour towards where their equation holds, by more than all the way. A row is computed as a whole and the other
-// colour kept, for which no cell of a row needs what another one there becomes.
+// The first half sweep, of red cells, from x = 0.
+void Multigrid::start(Level& level) {
+  const auto n = static_cast<int>(level.layer());
+  for (int k = 0; k < level.cells[2]; ++k) {
+    const std::ptrdiff_t from = level.index(0, 0, k);
+    const float *inverse = level.inverse.data() + from, *b = level.b.data() + from;
+    float* x = level.x.data() + from;
+    const int odd = (k + level.parity) & 1;
+#pragma GCC ivdep
+    for (int i = 0; i < n; ++i) x[i] = ((i ^ odd) & 1) == 0 ? inverse[i] * b[i] : 0;
+  }
+}
+
+// Cells of one colour towards where their equation holds, by more than all the way. A layer is computed as a whole and the other
+// colour kept, for which no cell of a layer needs what another one there becomes.
 void Multigrid::relax(Level& level, int colour) {
   fill_ghosts(level);
-  const float *cx = level.coupling[0].data(), *cy = level.coupling[1].data(), *cz = level.coupling[2].data();
-  const float *inverse = level.inverse.data(), *b = level.b.data();
-  float* x = level.x.data();
   const std::ptrdiff_t sy = level.stride(1), sz = level.stride(2);
-  const Int3 n = level.cells;
-  for (int k = 0; k < n[2]; ++k)
-    for (int j = 0; j < n[1]; ++j) {
-      const std::ptrdiff_t row = level.index(0, j, k);
-      const int odd = (j + k + level.parity + colour) & 1;
+  const auto n = static_cast<int>(level.layer());
+  for (int k = 0; k < level.cells[2]; ++k) {
+    const std::ptrdiff_t from = level.index(0, 0, k);
+    const float *cx = level.coupling[0].data() + from, *cy = level.coupling[1].data() + from, *cz = level.coupling[2].data() + from;
+    const float *inverse = level.inverse.data() + from, *b = level.b.data() + from;
+    float* x = level.x.data() + from;
+    const int odd = (k + level.parity + colour) & 1;
 #pragma GCC ivdep
-      for (int i = 0; i < n[0]; ++i) {
-        const std::ptrdiff_t c = row + i;
-        const float here = x[c];
-        const float lack = b[c] + cx[c] * (x[c - 1] - here) + cx[c + 1] * (x[c + 1] - here) + cy[c] * (x[c - sy] - here) +
-                           cy[c + sy] * (x[c + sy] - here) + cz[c] * (x[c - sz] - here) + cz[c + sz] * (x[c + sz] - here);
-        x[c] = ((i ^ odd) & 1) == 0 ? here + inverse[c] * lack : here;
-      }
+    for (int i = 0; i < n; ++i) {
+      const float here = x[i];
+      const float lack = b[i] + cx[i] * (x[i - 1] - here) + cx[i + 1] * (x[i + 1] - here) + cy[i] * (x[i - sy] - here) +
+                         cy[i + sy] * (x[i + sy] - here) + cz[i] * (x[i - sz] - here) + cz[i + sz] * (x[i + sz] - here);
+      x[i] = ((i ^ odd) & 1) == 0 ? here + inverse[i] * lack : here;
     }
+  }
 }
 
 void Multigrid::restrict_residual(Level& fine, Level& coarse) {
   fill_ghosts(fine);
-  const float *cx = fine.coupling[0].data(), *cy = fine.coupling[1].data(), *cz = fine.coupling[2].data();
-  const float *b = fine.b.data(), *x = fine.x.data();
-  float* row = row_.data();
   const std::ptrdiff_t sy = fine.stride(1), sz = fine.stride(2);
-  for (int kc = 0; kc < coarse.cells[2]; ++kc)
-    for (int jc = 0; jc < coarse.cells[1]; ++jc) {
-      const Int3 low{0, jc * fine.joined[1], kc * fine.joined[2]}, end = fine.end(low);
-      std::fill_n(row, fine.cells[0] + 1, 0.0f);
-      for (int k = low[2]; k < end[2]; ++k)
-        for (int j = low[1]; j < end[1]; ++j) {
-          const std::ptrdiff_t from = fine.index(0, j, k);
+  const auto n = static_cast<int>(fine.layer());
+  float* sum = row_.data();
+  for (int kc = 0; kc < coarse.cells[2]; ++kc) {
+    const int low = kc * fine.joined[2], end = fine.end({0, 0, low})[2];
+    std::fill_n(sum, n + 1, 0.0f);
+    for (int k = low; k < end; ++k) {
+      const std::ptrdiff_t from = fine.index(0, 0, k);
+      const float *cx = fine.coupling[0].data() + from, *cy = fine.coupling[1].data() + from, *cz = fine.coupling[2].data() + from;
+      const float *b = fine.b.data() + from, *x = fine.x.data() + from;
 #pragma GCC ivdep
-          for (int i = 0; i < fine.cells[0]; ++i) {
-            const std::ptrdiff_t c = from + i;
-            row[i] += b[c] + cx[c] * (x[c - 1] - x[c]) + cx[c + 1] * (x[c + 1] - x[c]) + cy[c] * (x[c - sy] - x[c]) +
-                      cy[c + sy] * (x[c + sy] - x[c]) + cz[c] * (x[c - sz] - x[c]) + cz[c + sz] * (x[c + sz] - x[c]);
-          }
-        }
+      for (int i = 0; i < n; ++i)
+        sum[i] += b[i] + cx[i] * (x[i - 1] - x[i]) + cx[i + 1] * (x[i + 1] - x[i]) + cy[i] * (x[i - sy] - x[i]) +
+                  cy[i + sy] * (x[i + sy] - x[i]) + cz[i] * (x[i - sz] - x[i]) + cz[i + sz] * (x[i + sz] - x[i]);
+    }
+    for (int jc = 0; jc < coarse.cells[1]; ++jc) {
+      const int first = jc * fine.joined[1];
+      float* row = sum + first * sy;
+      if (fine.end({0, first, 0})[1] > first + 1) {
+        for (int i = 0; i < fine.cells[0]; ++i) row[i] += row[i + sy];
+      }
+      row[fine.cells[0]] = 0;  // beyond an odd number of cells
       float* to = coarse.b.data() + coarse.index(0, jc, kc);
       if (fine.joined[0] == 1) {
         std::copy_n(row, coarse.cells[0], to);
@@ -107,6 +121,7 @@ void Multigrid::restrict_residual(Level& fine, Level& coarse) {
         for (int i = 0; i < coarse.cells[0]; ++i) to[i] = row[2 * i] + row[2 * i + 1];
       }
     }
+  }
 }
 
 void Multigrid::prolong(const Level& coarse, Level& fine) {

@@ -1,7 +1,8 @@
 // A multigrid V-cycle as a symmetric preconditioner, M, of the 7-point operator on cells.
 //
 // Cells are joined by twos in the directions in which they are narrow, in all once they are cubes, and within the ranks' blocks
-// as long as there is much to do; the few thousand cells that are left are gathered on every rank and solved there alike.
+// as long as there is much to do; the few thousand cells that are left are gathered on every rank and treated there alike. Some
+// dozens are solved by the inverse matrix.
 //
 //   residual of a coarse cell: the sum over its cells         correction of a cell: that of its coarse cell
 //   coupling of a coarse face: the sum over its faces × distance of the fine centres / distance of the coarse ones
@@ -44,15 +45,19 @@ class Multigrid {
     int parity = 0;          // of its first cell
     std::array<Edges, 3> edges;
     std::array<std::array<int, 2>, 3> neighbour{};  // the rank beyond; -1: nobody
-    // A layer of ghosts around the cells, x fastest.
+    // A layer of ghosts around the cells, x fastest. Rows have an odd length, so that the colours of a layer of cells along z take
+    // turns throughout: it is swept as one long row, in which a ghost has no relaxation and stays as it is.
     std::array<std::vector<float>, 3> coupling;  // by the cell's lower face
     std::array<std::vector<float>, 3> nearer;    // of faces along a direction: distance of the finer level's centres over its own
     std::vector<float> inverse;                  // relaxation over the diagonal; 0: a cell that touches no other
     std::vector<float> x, b;                     // correction and right side
 
     std::ptrdiff_t stride(int d) const {
-      return d == 0 ? 1 : d == 1 ? cells[0] + 2 : static_cast<std::ptrdiff_t>(cells[0] + 2) * (cells[1] + 2);
+      const std::ptrdiff_t row = (cells[0] + 2) | 1;
+      return d == 0 ? 1 : d == 1 ? row : row * (cells[1] + 2);
     }
+    std::ptrdiff_t layer() const { return stride(1) * (cells[1] - 1) + cells[0]; }  // from its first cell to its last
+
     std::ptrdiff_t index(int i, int j, int k) const { return (i + 1) + stride(1) * (j + 1) + stride(2) * (k + 1); }
     Int3 first() const;              // index of the block's first cell in the box
     float edge(int d, int i) const;  // of a cell or a ghost; 0 beyond the box
@@ -67,6 +72,8 @@ class Multigrid {
   void gather_couplings(const Level& from, Level& to);
   void set_order();
 
+  void invert_coarsest();
+  void solve_coarsest();
   void cycle(std::size_t l);
   void gather(const Level& part, Level& whole);
   static void take_part(const Level& whole, Level& part);
@@ -82,6 +89,9 @@ class Multigrid {
   std::size_t gathered_ = 0;           // the first level that is gathered; 0: none is
   double scale_ = 1;                   // of the couplings in single precision
   std::vector<std::ptrdiff_t> order_;  // cells of the gathered level as the ranks send them
+  std::vector<std::ptrdiff_t> coarsest_;   // cells of the last level
+  std::vector<float> solution_, inverse_;  // of its matrix, symmetric: a row for each
+  std::vector<double> matrix_;
   std::vector<float> row_;
   std::vector<double> send_, receive_;
 };

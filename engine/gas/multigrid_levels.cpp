@@ -11,6 +11,7 @@ namespace {
 
 constexpr std::int64_t most_gathered =
     4096;                          // cells: to solve them on every rank costs no more than the messages otherwise would
+constexpr std::int64_t most_solved = 100;  // cells of which the inverse matrix is taken: smoothing them costs more
 constexpr double longest = 1.5;    // edge over the narrowest one at which cells are still joined in its direction
 constexpr double half_sweeps = 3;  // on the finest level
 constexpr double growth = 0.5;     // half sweeps grow with this power of the ratio of cells, and
@@ -72,7 +73,7 @@ Multigrid::Multigrid(const Decomposition& decomposition, const Grid& grid) : dec
     add_level(edges, place, whole);
     Level& level = levels_.back();
     const std::int64_t cells = static_cast<std::int64_t>(level.global[0]) * level.global[1] * level.global[2];
-    if (cells == 1) break;
+    if (whole && cells <= most_solved) break;
     const bool stuck = !choose_joined(level);
     if (!whole && (stuck || cells <= most_gathered)) {
       for (Edges& e : edges) e = {chained(e)};
@@ -88,14 +89,22 @@ Multigrid::Multigrid(const Decomposition& decomposition, const Grid& grid) : dec
   }
   for (std::size_t l = 1; l < levels_.size(); ++l) measure(levels_[l - 1], levels_[l]);
   if (gathered_ > 0) set_order();
-  row_.resize(static_cast<std::size_t>(levels_[0].global[0]) + 2);
+  std::ptrdiff_t longest_row = 0;
+  for (const Level& level : levels_) longest_row = std::max({longest_row, level.layer() + 1, level.stride(1)});
+  row_.resize(static_cast<std::size_t>(longest_row));
+  const Level& last = levels_.back();
+  for (int k = 0; k < last.cells[2]; ++k)
+    for (int j = 0; j < last.cells[1]; ++j)
+      for (int i = 0; i < last.cells[0]; ++i) coarsest_.push_back(last.index(i, j, k));
+  solution_.resize(coarsest_.size());
+  inverse_.resize(coarsest_.size() * coarsest_.size());
+  matrix_.resize(inverse_.size());
 }
 
 void Multigrid::add_level(const std::array<Edges, 3>& edges, Int3 place, bool whole) {
   Level& level = levels_.emplace_back();
   level.edges = edges;
   level.place = place;
-  std::size_t size = 1;
   double finer = 1;  // finest cells in one of these
   for (int d = 0; d < 3; ++d) {
     level.cells[d] = static_cast<int>(edges[d][place[d]].size());
@@ -105,12 +114,12 @@ void Multigrid::add_level(const std::array<Edges, 3>& edges, Int3 place, bool wh
                                  : decomposition_.periodic(d) ? decomposition_.comm().rank()
                                                               : -1;
     }
-    size *= static_cast<std::size_t>(level.cells[d]) + 2;
     finer *= static_cast<double>(grid_.global[d]) / level.global[d];
   }
   const Int3 first = level.first();
   level.parity = (first[0] + first[1] + first[2]) & 1;
   level.half_sweeps = static_cast<int>(std::lround(half_sweeps * std::min(most_half_sweeps, std::pow(finer, growth))));
+  const auto size = static_cast<std::size_t>(level.stride(2)) * static_cast<std::size_t>(level.cells[2] + 2);
   for (auto* field : {&level.coupling[0], &level.coupling[1], &level.coupling[2], &level.inverse, &level.x, &level.b})
     field->assign(size, 0);
 }
@@ -156,14 +165,14 @@ void Multigrid::factor(const SevenPoint& matrix) {
         for (int i = 0; i < high[0]; ++i) to[i] = static_cast<float>(scale * from[i]);
       }
   }
-  invert(finest);
   for (std::size_t l = 1; l < levels_.size(); ++l) {
+    invert(levels_[l - 1]);
     if (l == gathered_)
       gather_couplings(levels_[l - 1], levels_[l]);
     else
       coarsen(levels_[l - 1], levels_[l]);
-    invert(levels_[l]);
   }
+  invert_coarsest();
 }
 
 void Multigrid::measure(const Level& fine, Level& coarse) const {
@@ -220,9 +229,50 @@ void Multigrid::invert(Level& level) const {
           const int cell = first[d] + at[d];
           sum += (closes && cell == 0 ? 2 : 1) * low + (closes && cell == level.global[d] - 1 ? 2 : 1) * high;
         }
-        const float share = &level == &levels_.back() ? 1 : static_cast<float>(relaxation);
-        level.inverse[c] = sum > 0 ? share / sum : 0;
+        level.inverse[c] = sum > 0 ? static_cast<float>(relaxation) / sum : 0;
       }
+}
+
+// By elimination, which needs no other order in a matrix like this. A cell that hangs on those before it alone, as where x is given
+// nowhere, has nothing left on its diagonal: x is 0 there.
+void Multigrid::invert_coarsest() {
+  const Level& level = levels_.back();
+  const std::size_t n = coarsest_.size();
+  std::fill(matrix_.begin(), matrix_.end(), 0.0);
+  for (std::size_t m = 0; m < n; ++m) {
+    double* row = matrix_.data() + m * n;
+    std::size_t stride = 1;
+    for (int d = 0; d < 3; ++d) {
+      const auto count = static_cast<std::size_t>(level.cells[d]), at = m / stride % count;
+      for (const std::size_t side : {0, 1}) {
+        const auto face = coarsest_[m] + static_cast<std::ptrdiff_t>(side) * level.stride(d);
+        const double coupling = static_cast<double>(level.coupling[d][face]);
+        const bool last = at == (side == 0 ? 0 : count - 1);
+        row[m] += coupling;
+        if (last && decomposition_.periodic(d)) row[side == 0 ? m + (count - 1) * stride : m - (count - 1) * stride] -= coupling;
+        if (!last) row[side == 0 ? m - stride : m + stride] -= coupling;
+      }
+      stride *= count;
+    }
+  }
+  std::vector<double> whole(n), pivot_row(n);
+  for (std::size_t m = 0; m < n; ++m) whole[m] = matrix_[m * n + m];
+  for (std::size_t m = 0; m < n; ++m) {
+    double* row = matrix_.data() + m * n;
+    const double inverse = row[m] > 1e-12 * whole[m] ? 1 / row[m] : 0;  // round-off of some hundred operations
+    for (std::size_t i = 0; i < n; ++i) pivot_row[i] = inverse * row[i];
+    for (std::size_t i = 0; i < n; ++i) {
+      if (i == m) continue;
+      double* other = matrix_.data() + i * n;
+      const double factor = other[m];
+      for (std::size_t j = 0; j < n; ++j) other[j] -= factor * pivot_row[j];
+      other[m] = -factor * inverse;
+    }
+    std::copy(pivot_row.begin(), pivot_row.end(), row);
+    row[m] = inverse;
+  }
+  for (std::size_t m = 0; m < n; ++m)
+    for (std::size_t i = 0; i < n; ++i) inverse_[m * n + i] = static_cast<float>(matrix_[std::max(m, i) * n + std::min(m, i)]);
 }
 
 // Both faces a cell and direction, for the last face of the box is no cell's lower one.

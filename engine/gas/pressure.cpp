@@ -15,7 +15,7 @@ PressureCorrection::PressureCorrection(const Decomposition& decomposition, const
       solver_(decomposition, grid, halo, preconditioner, work),
       correction_(work[3]),
       residual_(work[4]),
-      row_sum_(grid.cells[0]) {}
+      row_sum_(grid) {}
 
 void PressureCorrection::assemble(const Field& fraction, bool renew) {
   for (int d = 0; d < 3; ++d) {
@@ -25,7 +25,7 @@ void PressureCorrection::assemble(const Field& fraction, bool renew) {
     double* coupling = matrix_.coupling[d].data();
     Int3 high = grid_.cells;
     ++high[d];
-    for_rows(grid_, {0, 0, 0}, high, [=](auto c, int n) {
+    for_joined_rows(grid_, {0, 0, 0}, high, [=](auto c, int n) {
       for (auto i = c; i < c + n; ++i) coupling[i] *= half_area * (epsilon[i - s] + epsilon[i]);
     });
     halo_.fill(matrix_.coupling[d]);
@@ -40,7 +40,7 @@ void PressureCorrection::set_imbalance(const Field& fraction, const FaceField& v
   const double volume = grid_.cell_volume();
   const std::ptrdiff_t sy = grid_.stride(1), sz = grid_.stride(2);
   double* residual = residual_.data();
-  for_rows(grid_, [=](auto first, int n) {
+  for_joined_rows(grid_, [=](auto first, int n) {
     for (auto c = first; c < first + n; ++c)
       residual[c] = ax * ((e[c - 1] + e[c]) * u[c] - (e[c] + e[c + 1]) * u[c + 1]) +
                     ay * ((e[c - sy] + e[c]) * v[c] - (e[c] + e[c + sy]) * v[c + sy]) +
@@ -56,10 +56,10 @@ PressureCorrection::Result PressureCorrection::solve(double reduction, double en
   result.reached = reached;
   const double* r = residual_.data();
   double* partial = row_sum_.clear();
-  for_rows(grid_, [=](auto c, int n) {
+  for_joined_rows(grid_, [=](auto c, int n) {
     for (int i = 0; i < n; ++i) partial[i] += std::abs(r[c + i]);
   });
-  result.imbalance = decomposition_.comm().sum(row_sum_.total());
+  result.imbalance = decomposition_.comm().sum(row_sum_.total(grid_.cells[0]));
   return result;
 }
 

@@ -85,7 +85,7 @@ struct Cloud {
       if (std::holds_alternative<SubStepped>(scheme)) {
         transfer.locate(dem.particles());
         find_drag();
-        transfer.pull(gas, dem.particles());
+        transfer.pull(dem.particles());
       }
       dem.advance(1, dt / substeps);
     }
