@@ -102,7 +102,7 @@ class Transfer {
   struct alignas(32) Share {  // of a face, added as one
     double drag = 0, drag_momentum = 0, solids = 0, unused = 0;
   };
-  struct alignas(16) Pull {  // on a face
+  struct alignas(16) Pull {             // on a face
     double velocity = 0, gradient = 0;  // U, m/s, and ∇p, Pa/m, as the particles feel them
   };
   // Of all particles alike, or one a particle.

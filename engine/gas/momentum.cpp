@@ -190,7 +190,8 @@ void Momentum::relax(int d, const GasState& state, Sums& sums) {
     const double n = grid_.global[t], diffusion = setup_.viscosity * grid_.cell_volume() / (grid_.spacing[t] * grid_.spacing[t]);
     fine += 2 * diffusion * (1 / n - 1 / (n * n));
   }
-  double *coupling = largest_.clear(), *imbalance = row_sums_[0].clear(), *force = row_sums_[1].clear(), *throughput = row_sums_[2].clear();
+  double *coupling = largest_.clear(), *imbalance = row_sums_[0].clear(), *force = row_sums_[1].clear(),
+         *throughput = row_sums_[2].clear();
   const Int3 low = low_solved(d), high = high_solved(d);
   for_volumes(d, low, high, [=, this](auto first, int n) {
     const std::ptrdiff_t above = step_above(first, n);

@@ -5,6 +5,12 @@
 
 namespace bedflow {
 
+namespace {
+
+constexpr int stretch = 1024;  // of a layer, swept at once: new values and what they are made of stay in the nearest cache
+
+}  // namespace
+
 void Multigrid::apply(const Field& r, double magnitude, Field& z) {
   Level& finest = levels_[0];
   const Int3 n = finest.cells;
@@ -68,26 +74,31 @@ void Multigrid::start(Level& level) {
   }
 }
 
-// Cells of one colour towards where their equation holds, by more than all the way. A layer is computed as a whole and the other
-// colour kept, for which no cell of a layer needs what another one there becomes.
+// Cells of one colour towards where their equation holds, by more than all the way. A stretch of a layer is computed as a whole
+// and the other colour kept; no cell needs what another one of its colour becomes, so the new values may wait in a row of their
+// own (reading what has just been written would hold the processor up).
 void Multigrid::relax(Level& level, int colour) {
   fill_ghosts(level);
   const std::ptrdiff_t sy = level.stride(1), sz = level.stride(2);
-  const auto n = static_cast<int>(level.layer());
-  for (int k = 0; k < level.cells[2]; ++k) {
-    const std::ptrdiff_t from = level.index(0, 0, k);
-    const float *cx = level.coupling[0].data() + from, *cy = level.coupling[1].data() + from, *cz = level.coupling[2].data() + from;
-    const float *inverse = level.inverse.data() + from, *b = level.b.data() + from;
-    float* x = level.x.data() + from;
-    const int odd = (k + level.parity + colour) & 1;
+  const auto layer = static_cast<int>(level.layer());
+  float* next = row_.data();
+  for (int k = 0; k < level.cells[2]; ++k)
+    for (int start = 0; start < layer; start += stretch) {
+      const int n = std::min(stretch, layer - start), odd = (k + level.parity + colour + start) & 1;
+      const std::ptrdiff_t from = level.index(0, 0, k) + start;
+      const float *cx = level.coupling[0].data() + from, *cy = level.coupling[1].data() + from,
+                  *cz = level.coupling[2].data() + from;
+      const float *inverse = level.inverse.data() + from, *b = level.b.data() + from;
+      float* x = level.x.data() + from;
 #pragma GCC ivdep
-    for (int i = 0; i < n; ++i) {
-      const float here = x[i];
-      const float lack = b[i] + cx[i] * (x[i - 1] - here) + cx[i + 1] * (x[i + 1] - here) + cy[i] * (x[i - sy] - here) +
-                         cy[i + sy] * (x[i + sy] - here) + cz[i] * (x[i - sz] - here) + cz[i + sz] * (x[i + sz] - here);
-      x[i] = ((i ^ odd) & 1) == 0 ? here + inverse[i] * lack : here;
+      for (int i = 0; i < n; ++i) {
+        const float here = x[i];
+        const float lack = b[i] + cx[i] * (x[i - 1] - here) + cx[i + 1] * (x[i + 1] - here) + cy[i] * (x[i - sy] - here) +
+                           cy[i + sy] * (x[i + sy] - here) + cz[i] * (x[i - sz] - here) + cz[i + sz] * (x[i + sz] - here);
+        next[i] = here + (((i ^ odd) & 1) == 0 ? inverse[i] : 0) * lack;
+      }
+      std::copy_n(next, n, x);
     }
-  }
 }
 
 void Multigrid::restrict_residual(Level& fine, Level& coarse) {
@@ -100,7 +111,8 @@ void Multigrid::restrict_residual(Level& fine, Level& coarse) {
     std::fill_n(sum, n + 1, 0.0f);
     for (int k = low; k < end; ++k) {
       const std::ptrdiff_t from = fine.index(0, 0, k);
-      const float *cx = fine.coupling[0].data() + from, *cy = fine.coupling[1].data() + from, *cz = fine.coupling[2].data() + from;
+      const float *cx = fine.coupling[0].data() + from, *cy = fine.coupling[1].data() + from,
+                  *cz = fine.coupling[2].data() + from;
       const float *b = fine.b.data() + from, *x = fine.x.data() + from;
 #pragma GCC ivdep
       for (int i = 0; i < n; ++i)

@@ -45,8 +45,8 @@ class Multigrid {
     int parity = 0;          // of its first cell
     std::array<Edges, 3> edges;
     std::array<std::array<int, 2>, 3> neighbour{};  // the rank beyond; -1: nobody
-    // A layer of ghosts around the cells, x fastest. Rows have an odd length, so that the colours of a layer of cells along z take
-    // turns throughout: it is swept as one long row, in which a ghost has no relaxation and stays as it is.
+    // A layer of ghosts around the cells, x fastest. Rows have an odd length, so that the colours of a layer of cells along z
+    // take turns throughout: it is swept as one long row, in which a ghost has no relaxation and stays as it is.
     std::array<std::vector<float>, 3> coupling;  // by the cell's lower face
     std::array<std::vector<float>, 3> nearer;    // of faces along a direction: distance of the finer level's centres over its own
     std::vector<float> inverse;                  // relaxation over the diagonal; 0: a cell that touches no other
@@ -86,9 +86,9 @@ class Multigrid {
   const Decomposition& decomposition_;
   const Grid& grid_;
   std::vector<Level> levels_;
-  std::size_t gathered_ = 0;           // the first level that is gathered; 0: none is
-  double scale_ = 1;                   // of the couplings in single precision
-  std::vector<std::ptrdiff_t> order_;  // cells of the gathered level as the ranks send them
+  std::size_t gathered_ = 0;               // the first level that is gathered; 0: none is
+  double scale_ = 1;                       // of the couplings in single precision
+  std::vector<std::ptrdiff_t> order_;      // cells of the gathered level as the ranks send them
   std::vector<std::ptrdiff_t> coarsest_;   // cells of the last level
   std::vector<float> solution_, inverse_;  // of its matrix, symmetric: a row for each
   std::vector<double> matrix_;

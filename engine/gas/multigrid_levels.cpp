@@ -10,11 +10,11 @@ namespace bedflow {
 namespace {
 
 constexpr std::int64_t most_gathered =
-    4096;                          // cells: to solve them on every rank costs no more than the messages otherwise would
+    4096;                                  // cells: to solve them on every rank costs no more than the messages otherwise would
 constexpr std::int64_t most_solved = 100;  // cells of which the inverse matrix is taken: smoothing them costs more
-constexpr double longest = 1.5;    // edge over the narrowest one at which cells are still joined in its direction
-constexpr double half_sweeps = 3;  // on the finest level
-constexpr double growth = 0.5;     // half sweeps grow with this power of the ratio of cells, and
+constexpr double longest = 1.5;            // edge over the narrowest one at which cells are still joined in its direction
+constexpr double half_sweeps = 3;          // on the finest level
+constexpr double growth = 0.5;             // half sweeps grow with this power of the ratio of cells, and
 constexpr double most_half_sweeps = 16;
 constexpr double relaxation = 1.15;  // Yavneh 1996: about the best in three dimensions
 
@@ -233,8 +233,8 @@ void Multigrid::invert(Level& level) const {
       }
 }
 
-// By elimination, which needs no other order in a matrix like this. A cell that hangs on those before it alone, as where x is given
-// nowhere, has nothing left on its diagonal: x is 0 there.
+// By elimination, which needs no other order in a matrix like this. A cell that hangs on those before it alone, as where x is
+// given nowhere, has nothing left on its diagonal: x is 0 there.
 void Multigrid::invert_coarsest() {
   const Level& level = levels_.back();
   const std::size_t n = coarsest_.size();

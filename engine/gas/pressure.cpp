@@ -41,6 +41,7 @@ void PressureCorrection::set_imbalance(const Field& fraction, const FaceField& v
   const std::ptrdiff_t sy = grid_.stride(1), sz = grid_.stride(2);
   double* residual = residual_.data();
   for_joined_rows(grid_, [=](auto first, int n) {
+#pragma GCC ivdep
     for (auto c = first; c < first + n; ++c)
       residual[c] = ax * ((e[c - 1] + e[c]) * u[c] - (e[c] + e[c + 1]) * u[c + 1]) +
                     ay * ((e[c - sy] + e[c]) * v[c] - (e[c] + e[c + sy]) * v[c + sy]) +
