@@ -88,7 +88,7 @@ class Stencils {
   }
   static const double* x_shares(const Shares& shares, int lattice) { return shares.along[lattice == 0][0]; }
 
-  // `values` numbers of each of a row's points, those of as many points in a register as go in without a rest.
+  // `values` numbers of each of a row's points, one point after the other, in registers that are full.
   template <int values>
   class Line {
    public:
@@ -96,27 +96,28 @@ class Stencils {
     // `one` at each point, times its share x.
     Line(const double* x, const std::array<double, values>& one) {
       for (int q = 0; q < points; ++q)
-        for (int v = 0; v < values; ++v) part_[q / together][q % together * values + v] = x[q] * one[v];
+        for (int v = 0; v < values; ++v) part_[(q * values + v) / width][(q * values + v) % width] = x[q] * one[v];
     }
     // Adds weight times what stands from `from` on.
     void gather(double weight, const double* from) {
-      for (int i = 0; i < points / together; ++i) part_[i] += weight * load<width>(from + i * width);
+      for (int r = 0; r < registers; ++r) part_[r] += weight * load<width>(from + r * width);
     }
     // Adds weight times this to what stands from `to` on.
     void scatter(double weight, double* to) const {
-      for (int i = 0; i < points / together; ++i)
-        *reinterpret_cast<typename PackOf<width>::unaligned*>(to + i * width) += weight * part_[i];
+      for (int r = 0; r < registers; ++r)
+        *reinterpret_cast<typename PackOf<width>::unaligned*>(to + r * width) += weight * part_[r];
     }
     // Σ over the points of number v times the share x.
     double sum(const double* x, int v = 0) const {
       double result = 0;
-      for (int q = 0; q < points; ++q) result += x[q] * part_[q / together][q % together * values + v];
+      for (int q = 0; q < points; ++q) result += x[q] * part_[(q * values + v) / width][(q * values + v) % width];
       return result;
     }
 
    private:
-    static constexpr int together = points == 3 ? 1 : std::min(points, 8 / values), width = together * values;
-    Pack<width> part_[points / together]{};
+    static constexpr int numbers = points * values;
+    static constexpr int width = std::min(native_lanes, numbers & -numbers), registers = numbers / width;
+    Pack<width> part_[registers]{};
   };
   // Σ over the points of a lattice, of their numbers times their shares.
   template <int values>
