@@ -63,6 +63,10 @@ void Multigrid::solve_coarsest() {
 
 // The first half sweep, of red cells, from x = 0.
 void Multigrid::start(Level& level) {
+  if (level.lines >= 0) {
+    std::fill(level.x.begin(), level.x.end(), 0.0f);
+    return relax_lines(level, 0);
+  }
   const auto n = static_cast<int>(level.layer());
   for (int k = 0; k < level.cells[2]; ++k) {
     const std::ptrdiff_t from = level.index(0, 0, k);
@@ -78,6 +82,7 @@ void Multigrid::start(Level& level) {
 // and the other colour kept; no cell needs what another one of its colour becomes, so the new values may wait in a row of their
 // own (reading what has just been written would hold the processor up).
 void Multigrid::relax(Level& level, int colour) {
+  if (level.lines >= 0) return relax_lines(level, colour);
   fill_ghosts(level);
   const std::ptrdiff_t sy = level.stride(1), sz = level.stride(2);
   const auto layer = static_cast<int>(level.layer());

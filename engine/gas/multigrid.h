@@ -8,14 +8,15 @@
 //   coupling of a coarse face: the sum over its faces × distance of the fine centres / distance of the coarse ones
 //
 // which is Galerkin's operator of constant interpolation, with the over-correction of smooth errors taken out (Braess 1995): it
-// couples six cells again, and whatever the coefficients jump by, no error is corrected by more than the distances' ratio. Where
-// flat cells are joined in one direction only, a barrier inside a pair counts too, in series, to a third at the least: a
-// bubble's thin roof still stands on the coarse levels.
-// Smoothing is Gauss–Seidel in red and black, over-relaxed (Yavneh 1996), in reverse order after the coarse correction, and more
-// of it on coarser levels, which cost little. M is symmetric and positive (semi)definite, on any number of ranks. In single
-// precision: M need not be exact, and half the bytes are half the time.
+// couples six cells again, and whatever the coefficients jump by, no error is corrected by more than the distances' ratio. Cells
+// that are narrow in one direction are not joined in it but smoothed by lines (multigrid_lines.cpp), unless these are cut by
+// ranks or close on themselves. Where they are, a barrier inside a pair counts too, in series, to a third at the least: a
+// bubble's thin roof still stands on the coarse levels. Smoothing is Gauss–Seidel in red and black, over-relaxed (Yavneh 1996),
+// in reverse order after the coarse correction, and more of it on coarser levels, which cost little. M is symmetric and positive
+// (semi)definite, on any number of ranks. In single precision: M need not be exact, and half the bytes are half the time.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <vector>
 
@@ -40,6 +41,7 @@ class Multigrid {
   struct Level {
     Int3 cells{}, global{};  // of this rank and of the box; the same once gathered
     Int3 joined{1, 1, 1};    // cells of this level in one of the next
+    int lines = -1;          // direction of the lines that are smoothed as a whole; -1: single cells are
     int half_sweeps = 0;     // of the smoothing before the coarse correction, and as many after it
     Int3 place{};            // of this rank's block
     int parity = 0;          // of its first cell
@@ -59,16 +61,22 @@ class Multigrid {
     std::ptrdiff_t layer() const { return stride(1) * (cells[1] - 1) + cells[0]; }  // from its first cell to its last
 
     std::ptrdiff_t index(int i, int j, int k) const { return (i + 1) + stride(1) * (j + 1) + stride(2) * (k + 1); }
+    std::ptrdiff_t section() const {  // of lines that are solved together, and a row before and after it
+      return lines < 0 ? 0 : static_cast<std::ptrdiff_t>(cells[lines] + 2) * cells[lines == 0 ? 1 : 0];
+    }
     Int3 first() const;              // index of the block's first cell in the box
     float edge(int d, int i) const;  // of a cell or a ghost; 0 beyond the box
     Int3 end(Int3 low) const;        // of the cells that are joined with cell `low` in one of the next level
   };
 
   void add_level(const std::array<Edges, 3>& edges, Int3 place, bool whole);
-  bool choose_joined(Level& level) const;
+  bool choose_joined(Level& level, bool whole) const;
+  int narrow_direction(const Level& level, bool whole) const;
   void measure(const Level& fine, Level& coarse) const;
   void coarsen(const Level& fine, Level& coarse) const;
+  float diagonal_of(const Level& level, Int3 at) const;
   void invert(Level& level) const;
+  void factor_lines(Level& level) const;
   void gather_couplings(const Level& from, Level& to);
   void set_order();
 
@@ -78,8 +86,9 @@ class Multigrid {
   void gather(const Level& part, Level& whole);
   static void take_part(const Level& whole, Level& part);
   void fill_ghosts(Level& level);
-  static void start(Level& level);
+  void start(Level& level);
   void relax(Level& level, int colour);
+  void relax_lines(Level& level, int colour);
   void restrict_residual(Level& fine, Level& coarse);
   void prolong(const Level& coarse, Level& fine);
 

@@ -13,8 +13,9 @@ constexpr std::int64_t most_gathered =
     4096;                                  // cells: to solve them on every rank costs no more than the messages otherwise would
 constexpr std::int64_t most_solved = 100;  // cells of which the inverse matrix is taken: smoothing them costs more
 constexpr double longest = 1.5;            // edge over the narrowest one at which cells are still joined in its direction
-constexpr double half_sweeps = 3;          // on the finest level
-constexpr double growth = 0.5;             // half sweeps grow with this power of the ratio of cells, and
+constexpr double flat = 2;         // the other edges over the narrowest one, from which on its lines are smoothed as a whole
+constexpr double half_sweeps = 3;  // on the finest level
+constexpr double growth = 0.5;     // half sweeps grow with this power of the ratio of cells, and
 constexpr double most_half_sweeps = 16;
 constexpr double relaxation = 1.15;  // Yavneh 1996: about the best in three dimensions
 
@@ -74,7 +75,7 @@ Multigrid::Multigrid(const Decomposition& decomposition, const Grid& grid) : dec
     Level& level = levels_.back();
     const std::int64_t cells = static_cast<std::int64_t>(level.global[0]) * level.global[1] * level.global[2];
     if (whole && cells <= most_solved) break;
-    const bool stuck = !choose_joined(level);
+    const bool stuck = !choose_joined(level, whole);
     if (!whole && (stuck || cells <= most_gathered)) {
       for (Edges& e : edges) e = {chained(e)};
       level.joined = {1, 1, 1};
@@ -90,7 +91,7 @@ Multigrid::Multigrid(const Decomposition& decomposition, const Grid& grid) : dec
   for (std::size_t l = 1; l < levels_.size(); ++l) measure(levels_[l - 1], levels_[l]);
   if (gathered_ > 0) set_order();
   std::ptrdiff_t longest_row = 0;
-  for (const Level& level : levels_) longest_row = std::max({longest_row, level.layer() + 1, level.stride(1)});
+  for (const Level& level : levels_) longest_row = std::max({longest_row, level.layer() + 1, level.stride(1), level.section()});
   row_.resize(static_cast<std::size_t>(longest_row));
   const Level& last = levels_.back();
   for (int k = 0; k < last.cells[2]; ++k)
@@ -124,17 +125,34 @@ void Multigrid::add_level(const std::array<Edges, 3>& edges, Int3 place, bool wh
     field->assign(size, 0);
 }
 
+// In which all lines lie within this rank's block, and cells are flat; -1: there is none.
+int Multigrid::narrow_direction(const Level& level, bool whole) const {
+  for (int d = 0; d < 3; ++d) {
+    if (level.global[d] == 1 || decomposition_.periodic(d) || !(whole || decomposition_.ranks()[d] == 1)) continue;
+    const double edge = decomposition_.size()[d] / level.global[d];
+    bool narrow = true, others = false;
+    for (int t = 0; t < 3; ++t) {
+      if (t == d || level.global[t] == 1) continue;
+      others = true;
+      narrow = narrow && decomposition_.size()[t] / level.global[t] >= flat * edge;
+    }
+    if (narrow && others) return d;
+  }
+  return -1;
+}
+
 // False: a block is down to one cell in a direction in which cells should be joined.
-bool Multigrid::choose_joined(Level& level) const {
+bool Multigrid::choose_joined(Level& level, bool whole) const {
+  level.lines = narrow_direction(level, whole);
   double narrowest = std::numeric_limits<double>::infinity();
   Vec3 edge;
   for (int d = 0; d < 3; ++d) {
     edge[d] = decomposition_.size()[d] / level.global[d];
-    if (level.global[d] > 1) narrowest = std::min(narrowest, edge[d]);
+    if (level.global[d] > 1 && d != level.lines) narrowest = std::min(narrowest, edge[d]);
   }
   bool possible = true;
   for (int d = 0; d < 3; ++d) {
-    if (level.global[d] == 1 || edge[d] >= longest * narrowest) continue;
+    if (level.global[d] == 1 || d == level.lines || edge[d] >= longest * narrowest) continue;
     level.joined[d] = 2;
     for (const auto& block : level.edges[d]) possible = possible && (block.size() > 1 || level.edges[d].size() == 1);
   }
@@ -188,7 +206,7 @@ void Multigrid::coarsen(const Level& fine, Level& coarse) const {
   for (int d = 0; d < 3; ++d) {
     if (coarse.global[d] == 1 && decomposition_.periodic(d)) continue;  // a cell beside itself
     const int t1 = (d + 1) % 3, t2 = (d + 2) % 3;
-    const bool alone = fine.joined[d] == 2 && fine.joined[t1] == 1 && fine.joined[t2] == 1;
+    const bool alone = fine.lines < 0 && fine.joined[d] == 2 && fine.joined[t1] == 1 && fine.joined[t2] == 1;
     Int3 high = coarse.cells, at{};
     ++high[d];
     for (at[2] = 0; at[2] < high[2]; ++at[2])
@@ -215,21 +233,27 @@ void Multigrid::coarsen(const Level& fine, Level& coarse) const {
 
 // Where an odd number of cells closes on itself, two of one colour meet: what they hold each other by counts twice, so that the
 // half sweep, which does not see that both move, cannot overshoot.
-void Multigrid::invert(Level& level) const {
+float Multigrid::diagonal_of(const Level& level, Int3 at) const {
+  const std::ptrdiff_t c = level.index(at[0], at[1], at[2]);
   const Int3 first = level.first();
+  float sum = 0;
+  for (int d = 0; d < 3; ++d) {
+    const float low = level.coupling[d][c], high = level.coupling[d][c + level.stride(d)];
+    const bool closes = decomposition_.periodic(d) && level.global[d] % 2 == 1;
+    const int cell = first[d] + at[d];
+    sum += (closes && cell == 0 ? 2 : 1) * low + (closes && cell == level.global[d] - 1 ? 2 : 1) * high;
+  }
+  return sum;
+}
+
+void Multigrid::invert(Level& level) const {
+  if (level.lines >= 0) return factor_lines(level);
   Int3 at{};
   for (at[2] = 0; at[2] < level.cells[2]; ++at[2])
     for (at[1] = 0; at[1] < level.cells[1]; ++at[1])
       for (at[0] = 0; at[0] < level.cells[0]; ++at[0]) {
-        const std::ptrdiff_t c = level.index(at[0], at[1], at[2]);
-        float sum = 0;
-        for (int d = 0; d < 3; ++d) {
-          const float low = level.coupling[d][c], high = level.coupling[d][c + level.stride(d)];
-          const bool closes = decomposition_.periodic(d) && level.global[d] % 2 == 1;
-          const int cell = first[d] + at[d];
-          sum += (closes && cell == 0 ? 2 : 1) * low + (closes && cell == level.global[d] - 1 ? 2 : 1) * high;
-        }
-        level.inverse[c] = sum > 0 ? static_cast<float>(relaxation) / sum : 0;
+        const float sum = diagonal_of(level, at);
+        level.inverse[level.index(at[0], at[1], at[2])] = sum > 0 ? static_cast<float>(relaxation) / sum : 0;
       }
 }
 

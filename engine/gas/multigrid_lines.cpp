@@ -1,0 +1,81 @@
+// Smoothing of flat cells: all cells of a line in their narrow direction at once, lines in red and black.
+//
+// Their couplings along the line exceed the others by the square of the cells' flatness, and whatever stands across it, a
+// bubble's roof of three cells, is solved for. So the cells need not be joined along the line, where constant corrections would
+// run through such a roof, and no coarse level has to know of it.
+#include "gas/multigrid.h"
+
+namespace bedflow {
+
+// The pivots of each line's matrix, inverted; 0: a cell that touches no other, or hangs on those before it in the line alone.
+void Multigrid::factor_lines(Level& level) const {
+  constexpr double nothing_left = 1e-9;  // of a diagonal, in double precision
+  const int along = level.lines, u = (along + 1) % 3, v = (along + 2) % 3;
+  const auto& coupling = level.coupling[along];
+  Int3 at{};
+  for (at[v] = 0; at[v] < level.cells[v]; ++at[v])
+    for (at[u] = 0; at[u] < level.cells[u]; ++at[u]) {
+      double before = 0;  // the inverse pivot of the cell before
+      for (at[along] = 0; at[along] < level.cells[along]; ++at[along]) {
+        const std::ptrdiff_t c = level.index(at[0], at[1], at[2]);
+        const double diagonal = static_cast<double>(diagonal_of(level, at));
+        const double link = at[along] > 0 ? static_cast<double>(coupling[c]) : 0, pivot = diagonal - link * link * before;
+        before = pivot > nothing_left * diagonal ? 1 / pivot : 0;
+        level.inverse[c] = static_cast<float>(before);
+      }
+    }
+}
+
+void Multigrid::relax_lines(Level& level, int colour) {
+  constexpr float over = 1.1f;
+  fill_ghosts(level);
+  const int along = level.lines, across = along == 0 ? 1 : 0, other = 3 - along - across, n = level.cells[across];
+  const std::ptrdiff_t s = level.stride(along), sa = level.stride(across), sx = level.stride(0), sy = level.stride(1),
+                       sz = level.stride(2);
+  const float *cx = level.coupling[0].data(), *cy = level.coupling[1].data(), *cz = level.coupling[2].data();
+  const float *link = level.coupling[along].data(), *inverse = level.inverse.data(), *b = level.b.data();
+  float* x = level.x.data();
+  for (int o = 0; o < level.cells[other]; ++o) {
+    const std::ptrdiff_t first = level.index(0, 0, 0) + o * level.stride(other);
+    const int odd = (o + level.parity + colour) & 1;
+    float* change = row_.data();
+    std::fill_n(change, n, 0.0f);
+    change += n;
+    for (int m = 0; m < level.cells[along]; ++m, change += n) {
+      const std::ptrdiff_t from = first + m * s;
+      const auto eliminate = [=](std::ptrdiff_t step) {
+#pragma GCC ivdep
+        for (int i = 0; i < n; ++i) {
+          const std::ptrdiff_t c = from + i * step;
+          const float here = x[c];
+          const float lack = b[c] + cx[c] * (x[c - sx] - here) + cx[c + sx] * (x[c + sx] - here) + cy[c] * (x[c - sy] - here) +
+                             cy[c + sy] * (x[c + sy] - here) + cz[c] * (x[c - sz] - here) + cz[c + sz] * (x[c + sz] - here);
+          change[i] = inverse[c] * (lack + link[c] * change[i - n]);
+        }
+      };
+      if (sa == 1)
+        eliminate(1);
+      else
+        eliminate(sa);
+    }
+    std::fill_n(change, n, 0.0f);
+    for (int m = level.cells[along] - 1; m >= 0; --m) {
+      change -= n;
+      const std::ptrdiff_t from = first + m * s;
+      const auto substitute = [=](std::ptrdiff_t step) {
+#pragma GCC ivdep
+        for (int i = 0; i < n; ++i) {
+          const std::ptrdiff_t c = from + i * step;
+          change[i] += inverse[c] * link[c + s] * change[i + n];
+          x[c] += (((i ^ odd) & 1) == 0 ? over : 0) * change[i];
+        }
+      };
+      if (sa == 1)
+        substitute(1);
+      else
+        substitute(sa);
+    }
+  }
+}
+
+}  // namespace bedflow
