@@ -27,23 +27,36 @@ std::string cell_text(const Grid& grid, Int3 cell) {
   return name.str() + " at " + text(centre) + " m";
 }
 
-double transport(const Grid& grid, const FaceField& velocity, std::ptrdiff_t c) {
-  double rate = 0;
-  for (int d = 0; d < 3; ++d) {
-    const double* u = velocity[d].data();
-    rate += std::max(std::abs(u[c]), std::abs(u[c + grid.stride(d)])) / grid.spacing[d];
+// Σ|U|/h of the cells of a grid: of each direction the faster of its two faces, 1/s.
+class Transport {
+ public:
+  Transport(const Grid& grid, const FaceField& velocity) {
+    for (int d = 0; d < 3; ++d) {
+      u_[d] = velocity[d].data();
+      stride_[d] = grid.stride(d);
+      per_spacing_[d] = 1 / grid.spacing[d];
+    }
   }
-  return rate;
-}
+  double operator()(std::ptrdiff_t c) const { return along(0, c) + along(1, c) + along(2, c); }
+
+ private:
+  double along(int d, std::ptrdiff_t c) const {
+    return per_spacing_[d] * std::max(std::abs(u_[d][c]), std::abs(u_[d][c + stride_[d]]));
+  }
+  const double* u_[3];
+  std::ptrdiff_t stride_[3];
+  Vec3 per_spacing_;
+};
 
 // The cell of this block with the largest Σ|U|/h, or one where it is not a number.
 Int3 worst_cell(const Grid& grid, const FaceField& velocity) {
+  const Transport transport(grid, velocity);
   Int3 worst{};
   double most = 0;
   for (int k = 0; k < grid.cells[2]; ++k)
     for (int j = 0; j < grid.cells[1]; ++j)
       for (int i = 0; i < grid.cells[0]; ++i) {
-        const double rate = transport(grid, velocity, grid.index(i, j, k));
+        const double rate = transport(grid.index(i, j, k));
         if (std::isnan(rate)) return {i, j, k};
         if (rate > most) most = rate, worst = {i, j, k};
       }
@@ -53,9 +66,10 @@ Int3 worst_cell(const Grid& grid, const FaceField& velocity) {
 }  // namespace
 
 double fastest_transport(const Grid& grid, const FaceField& velocity) {
+  const Transport transport(grid, velocity);
   double fastest = 0;
   for_rows(grid, [&](auto first, int n) {
-    for (auto c = first; c < first + n; ++c) fastest = std::max(fastest, transport(grid, velocity, c));
+    for (auto c = first; c < first + n; ++c) fastest = std::max(fastest, transport(c));
   });
   return fastest;
 }
@@ -89,13 +103,14 @@ void watch_particles(const GuardSetup& limits, const Dem& dem, double deepest, d
 }
 
 void watch_gas(const GuardSetup& limits, const Grid& grid, const FaceField& velocity, double dt, Failure& failure) {
+  const Transport transport(grid, velocity);
   std::int64_t beyond = 0;
   for_rows(grid, [&](auto first, int n) {
-    for (auto c = first; c < first + n; ++c) beyond += !(dt * transport(grid, velocity, c) <= limits.courant);
+    for (auto c = first; c < first + n; ++c) beyond += !(dt * transport(c) <= limits.courant);
   });
   if (beyond == 0) return;
   const Int3 worst = worst_cell(grid, velocity);
-  const double courant = dt * transport(grid, velocity, grid.index(worst[0], worst[1], worst[2]));
+  const double courant = dt * transport(grid.index(worst[0], worst[1], worst[2]));
   failure.note(Reason::diverged, "the gas has the Courant number " + short_number(courant) + " in " + cell_text(grid, worst) +
                                      ", guard.courant is " + short_number(limits.courant) + "; a shorter time.step lowers it");
 }

@@ -18,6 +18,13 @@ AnyStencils stencils_for(int points, const Grid& grid) {
   return Stencils<4>(grid);
 }
 
+// Whether blocks or periodic images meet at any face.
+bool shared(const Decomposition& decomposition) {
+  for (int d = 0; d < 3; ++d)
+    if (!decomposition.at_face(d, 0) || !decomposition.at_face(d, 1)) return true;
+  return false;
+}
+
 }  // namespace
 
 int kernel_points(const Kernel& kernel, double diameter, Vec3 spacing) {
@@ -45,6 +52,8 @@ Transfer::Transfer(const Decomposition& decomposition, const Grid& grid, Halo& h
       relaxes_(std::visit([](const auto& scheme) { return scheme.relaxes; }, setup.scheme)),
       timer_(timer),
       lattices_(decomposition, grid),
+      rows_(grid, shared(decomposition) || std::holds_alternative<Gaussian>(setup.kernel) ||
+                      std::visit([](const auto& scheme) { return scheme.anew; }, setup.scheme)),
       fences_(decomposition, grid, setup.panels),
       stencils_(stencils_for(kernel_points(setup.kernel, setup.diameter, grid.spacing), grid)),
       gradient_(grid),
@@ -74,6 +83,11 @@ void Transfer::find_sizes(const ParticleStore& particles) {
 }
 
 void Transfer::locate(const ParticleStore& particles) {
+  find_places(particles);
+  rows_.take_all();
+}
+
+void Transfer::find_places(const ParticleStore& particles) {
   find_sizes(particles);
   const auto diameter_of = [&](std::size_t p) { return sizes_.diameter_of(p); };
   std::visit(
@@ -85,7 +99,7 @@ double Transfer::deposit_volume(const ParticleStore& particles, Field& fraction)
   const PhaseTimer::Scope scope(timer_, Phase::deposit, particles.owned);
   fraction.fill(0);
   double* solids = fraction.data();
-  locate(particles);
+  find_places(particles);
   std::visit(
       [&]<int points>(const Stencils<points>& stencils) {
         for (std::size_t p = 0; p < particles.owned; ++p) {
@@ -95,6 +109,7 @@ double Transfer::deposit_volume(const ParticleStore& particles, Field& fraction)
         }
       },
       stencils_);
+  rows_.find(fraction);
   halo_.add(fraction);
   if (smoothing_) smoothing_->apply(fraction, cell_centres);
 
@@ -103,6 +118,10 @@ double Transfer::deposit_volume(const ParticleStore& particles, Field& fraction)
   lowest_ = {};
   lattices_.each_owned_row(cell_centres, [&](Int3 first, int n) {
     double* row = &fraction(first[0], first[1], first[2]);
+    if (!rows_.now(row - fraction.data())) {
+      std::fill_n(row, n, 1.0);
+      return;
+    }
     for (int i = 0; i < n; ++i) {
       const double value = 1 - row[i];
       row[i] = std::max(value, floor);
@@ -126,9 +145,11 @@ void Transfer::mirror_at_faces(Field& field) const {
       low[d] = side == 0 ? -g : grid_.cells[d];
       high[d] = low[d] + g;
       for (int k = low[2]; k < high[2]; ++k)
-        for (int j = low[1]; j < high[1]; ++j)
-          for (int i = low[0]; i < high[0]; ++i)
-            field(i, j, k) = field(d == 0 ? inside : i, d == 1 ? inside : j, d == 2 ? inside : k);
+        for (int j = low[1]; j < high[1]; ++j) {
+          const auto row = [&](int y, int z) { return field.data() + grid_.index(low[0], y, z); };
+          if (d == 0) std::fill_n(row(j, k), g, field(inside, j, k));
+          if (d != 0) std::copy_n(row(d == 1 ? inside : j, d == 2 ? inside : k), high[0] - low[0], row(j, k));
+        }
     }
 }
 
@@ -215,6 +236,7 @@ void Transfer::spread(const ParticleStore& particles, Exchange& exchange) {
     double *drags = exchange.drag[d].data(), *momenta = exchange.drag_momentum[d].data(), *solids = exchange.buoyancy[d].data();
     Share* shares = shares_[d].data();
     lattices_.each_row(d, [&](std::ptrdiff_t first, int n) {
+      if (!rows_.lately(first)) return;
       for (auto at = first; at < first + n; ++at) {
         drags[at] = shares[at].drag;
         momenta[at] = shares[at].drag_momentum;
@@ -235,6 +257,7 @@ void Transfer::per_node_volume(Exchange& exchange) {
     const auto each_row = [&](auto row) {
       lattices_.each_owned_row(d, [&](Int3 first, int n) {
         const std::ptrdiff_t c = grid_.index(first[0], first[1], first[2]);
+        if (!rows_.lately(c)) return;
         row(exchange.drag[d].data() + c, exchange.drag_momentum[d].data() + c, exchange.buoyancy[d].data() + c,
             buoyancy_share_[d].data() + c, lattices_.node_volume(d, first), n);
       });
@@ -277,6 +300,7 @@ void Transfer::deposit_drag(const ParticleStore& particles, const Interval& step
   }
   spread(particles, exchange);
   per_node_volume(exchange);
+  rows_.forget();
 }
 
 // ---------------------------------------------------------------------------------------------------- back to the particles
@@ -288,6 +312,7 @@ void Transfer::sample(const GasState& gas, ParticleStore& particles) {
     double* gradient = gradient_.data();
     lattices_.each_owned_row(d, [&](Int3 first, int n) {
       const std::ptrdiff_t c = grid_.index(first[0], first[1], first[2]);
+      if (!rows_.now(c)) return;
       const double* share = buoyancy_share_[d].data();
       for (auto at = c; at < c + n; ++at) gradient[at] = share[at] * gradient_at(gas, d, at);
     });
@@ -298,7 +323,8 @@ void Transfer::sample(const GasState& gas, ParticleStore& particles) {
     }
     const double* u = velocity[d].data();
     Pull* pulls = pulls_[d].data();
-    lattices_.each_row(d, [=](std::ptrdiff_t first, int n) {
+    lattices_.each_row(d, [&, u, pulls](std::ptrdiff_t first, int n) {
+      if (!rows_.now(first)) return;
       for (auto at = first; at < first + n; ++at) pulls[at] = {u[at], gradient[at]};
     });
   }

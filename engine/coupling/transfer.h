@@ -12,6 +12,7 @@
 #include "base/phase_timer.h"
 #include "coupling/fences.h"
 #include "coupling/lattices.h"
+#include "coupling/rows_in_use.h"
 #include "coupling/smoothing.h"
 #include "coupling/stencils.h"
 #include "gas/gas_solver.h"
@@ -113,6 +114,7 @@ class Transfer {
     double volume_of(std::size_t p) const { return volume[p * step]; }
     double mass_of(std::size_t p) const { return mass[p * step]; }
   };
+  void find_places(const ParticleStore& particles);
   void find_sizes(const ParticleStore& particles);
   // U as a particle feels it: that of the gas, or smoothed.
   const FaceField& felt_velocity(const FaceField& velocity);
@@ -135,6 +137,7 @@ class Transfer {
   bool relaxes_;
   PhaseTimer& timer_;
   Lattices lattices_;
+  RowsInUse rows_;
   Fences fences_;
   std::optional<Smoothing> smoothing_;
   std::variant<Stencils<2>, Stencils<3>, Stencils<4>> stencils_;

@@ -8,6 +8,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "support/seeds.h"
+
 namespace bedflow {
 
 namespace {

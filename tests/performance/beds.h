@@ -8,7 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "support/dem_scene.h"
+#include "particles/seeding.h"
+#include "support/spheres.h"
 
 namespace bedflow {
 

@@ -13,6 +13,7 @@
 
 #include "beds.h"
 #include "particles/cells.h"
+#include "support/dem_scene.h"
 
 namespace bedflow {
 namespace {

@@ -11,7 +11,7 @@ bed     whole beds from a fluidized state, by CPU time and the engine's summary.
 presets the presets on the Müller bed: what they cost, and what they say of it
 peers   ours against LAMMPS on the same bed, in turn (needs Debian's package lammps)
 scaling 1 and 2 ranks measured, up to 10 000 predicted by the cost model of scaling.py
-trade   what the plan tells of a run before it, against what the run needs
+trade   what the plan tells of a run before it, against what the run needs; what a scene pays for what it does not use
 service submissions, 10 000 jobs, a million samples, 1000 watchers, on the real server and engine
 
 --record keeps the figures as this machine's baseline. The exit code is 1 when a figure is short of its target.
@@ -65,6 +65,7 @@ TARGETS = {
     "bed/goldschmidt-1.5@mfix-exa-2018/cost": ("<=", 200),
     **{f"trade/estimate/{what}/{scene}": ("<=", 1.3)
        for what in ("seconds", "memory", "checkpoint") for scene in trade.SCENES},
+    **{f"plan/{name}": ("<=", most) for name, most in trade.UNUSED.items()},
     "service/submit/median": ("<=", 5),
     "service/list/first_page": ("<=", 50),
     "service/restart": ("<=", 2),

@@ -55,5 +55,30 @@ def estimates(bin_folder):
                          [f"told {factor * plan[name]:.3g} {unit}", f"needed {factor * real[name]:.3g} {unit}"])
 
 
+# What a scene may pay for what it does not use (bench_plan) -> the most, and why not less.
+UNUSED = {
+    "particles_alone": 1.05,       # the engine around the bare sweeps: a look at every particle a step, the vote, the clock
+    "gas_alone": 1.05,             # the engine around the bare solver: the guard reads the velocity once a step
+    "frictionless": 0.85,          # no spins and no torques: a quarter of a contact's arithmetic
+    "no_history": 0.70,            # no memory of contacts: neither its arithmetic nor its 32 bytes a pair
+    "one_size/listed": 1.03,       # the same scene, said in another way: 1 and what medians scatter
+    "one_size/one_class": 1.03,
+    "walls_far_away": 1.03,        # a look at a list that is empty
+    "energy_watch": 1.02,          # the contacts are looked through once in 16 steps
+    "freeboard/transfer": 1.10,    # the gas fraction of each cell is set and read; all else is where particles are
+    "freeboard/particles": 1.05,   # none: 1 and what the fastest of some steps scatters
+    "empty_bed": 1.06,             # likewise, beside the gas of the same cells
+    "resting/rebuilds": 5,         # a few particles bounce on its surface for long: one moves half a skin in some 300 sub-steps
+    "resting/lists": 8,            # so many rebuilds of a spring's list, each worth some 15 sub-steps
+}
+
+
+def unused(bin_folder):
+    for said in run([bin_folder / "bench_plan"], one_core()).splitlines():
+        name, value, unit, *notes = said.split(", ")
+        yield Figure(name, float(value), unit, notes)
+
+
 def trade(bin_folder):
     yield from estimates(bin_folder)
+    yield from unused(bin_folder)
