@@ -67,6 +67,7 @@ struct GuardSetup {
   double move = 0.1;        // of a particle in a sub-step, over its diameter, at most
   double gas_fraction = 0;  // of a cell, before the floor, at least
   double courant = 100;     // at most
+  double energy = 0.2;      // that contacts create, over what there is, at most; 0: not watched
   int retries = 0;          // from the last checkpoint, each with half the step
 };
 

@@ -53,7 +53,11 @@ Simulation::CouplingPart::CouplingPart(const Decomposition& decomposition, const
       fraction_before(gas.grid) {}
 
 Simulation::Simulation(const Plan& plan, const Comm& comm, PhaseTimer& timer, Cuts cuts)
-    : plan_(plan), timer_(timer), decomposition_(comm, plan.scene.size, plan.scene.periodic, std::move(cuts)), controller_(plan) {
+    : plan_(plan),
+      timer_(timer),
+      decomposition_(comm, plan.scene.size, plan.scene.periodic, std::move(cuts)),
+      controller_(plan),
+      energy_(plan.scene.guard.energy) {
   if (plan.scene.gas) gas_ = std::make_unique<GasPart>(decomposition_, plan_, timer_);
   if (plan.scene.particles) {
     dem_ = std::make_unique<Dem>(decomposition_, dem_setup(plan_), plan.scene.particles->laws, timer_, plan.scene.walls);
@@ -92,6 +96,7 @@ void Simulation::watch(double dt) {
   const GuardSetup& limits = plan_.scene.guard;
   if (coupling_) watch_fraction(limits, gas_->grid, coupling_->transfer.lowest(), failure_);
   if (gas_) watch_gas(limits, gas_->grid, gas_->state.velocity, dt, failure_);
+  if (dem_) energy_.look(*dem_, decomposition_.comm(), failure_);
   if (dem_) watch_particles(limits, *dem_, max_overlap_, dt / last_substeps_, failure_);
 }
 
@@ -175,6 +180,7 @@ void Simulation::audit_exchange() {
 
 void Simulation::advance_particles(double dt) {
   const int substeps = substeps_in(dt);
+  energy_.prepare(*dem_);
   if (coupling_ && std::visit([](const auto& scheme) { return scheme.anew; }, plan_.scene.coupling->scheme)) {
     for (int substep = 0; substep < substeps; ++substep) {
       pull_anew();
@@ -244,6 +250,7 @@ bool Simulation::settle() {
   settled_time_ += substeps * plan_.substep;
   dem_->take_max_overlap();
   dem_->take_wall_loads();
+  energy_.begin();
   // Not before the highest has had the time to fall: at the start all are slow.
   const double energy = decomposition_.comm().sum(dem_->kinetic_energy());
   const double speed = std::sqrt(2 * energy / turnover_.initial.mass);

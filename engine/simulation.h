@@ -10,6 +10,7 @@
 #include "base/phase_timer.h"
 #include "checkpoint/checkpoint.h"
 #include "coupling/transfer.h"
+#include "energy_watch.h"
 #include "gas/gas_solver.h"
 #include "particles/dem.h"
 #include "particles/insertion.h"
@@ -136,6 +137,7 @@ class Simulation {
   Turnover turnover_;
   GasOutcome gas_outcome_;
   Failure failure_;  // that the guard has found
+  EnergyWatch energy_;
   std::vector<std::string> notes_;
 };
 

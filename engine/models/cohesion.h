@@ -1,6 +1,7 @@
 // Attraction between bodies near each other. Holds for one pair (Real a double) or for a pack of them.
 #pragma once
 
+#include <algorithm>
 #include <variant>
 
 #include "base/vec3.h"
@@ -25,6 +26,12 @@ struct VanDerWaals {
   Real operator()(Real gap, Real radius) const {
     const Real distance = max(gap, broadcast<Real>(nearest));
     return select(gap <= furthest, hamaker / 6 * radius / (distance * distance), Real{});
+  }
+  // The work of the force from here to beyond the cut-off, with the sign of a potential, J.
+  double energy(double gap, double radius) const {
+    if (gap > furthest) return 0;
+    const double distance = std::max(gap, nearest), well = hamaker / 6 * radius;
+    return well * ((gap - distance) / (distance * distance) + 1 / furthest - 1 / distance);
   }
 };
 

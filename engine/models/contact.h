@@ -36,6 +36,7 @@ struct LinearSpringDashpot {
   Real operator()(const Touching<Real>& c) const {
     return stiffness * c.overlap + damping(c.mass) * c.approach;
   }
+  double energy(const Touching<double>& c) const { return 0.5 * stiffness * c.overlap * c.overlap; }  // of the spring, J
   template <class Real>
   Real damping(Real mass) const {  // η, kg/s
     return 2 * damping_share * sqrt(stiffness * mass);
@@ -62,6 +63,10 @@ struct Hertz {
   Real operator()(const Touching<Real>& c) const {
     const Real slope = 2 * modulus * sqrt(c.radius * c.overlap);  // S_n = dF/dδ of the elastic part
     return 2.0 / 3 * slope * c.overlap + 2 * std::sqrt(5.0 / 6) * damping_share * sqrt(slope * c.mass) * c.approach;
+  }
+
+  double energy(const Touching<double>& c) const {  // of the elastic part, J
+    return 8.0 / 15 * modulus * std::sqrt(c.radius * c.overlap) * c.overlap * c.overlap;
   }
 
   static Hertz from_restitution(double modulus, double restitution) { return {modulus, bedflow::damping_share(restitution)}; }

@@ -57,6 +57,10 @@ struct SpringRolling {
     angle = turned(angle, c.normal);
     return stick_or_slip(angle, c.rate, c.dt, stiffness, 2 * damping_share * sqrt(c.inertia * stiffness), arm * c.normal_force);
   }
+  double energy(const Touching<double>& c, Vec3 angle) const {  // of the spring, J
+    const double arm = friction * c.radius;
+    return 0.5 * 2.25 * normal_stiffness * arm * arm * dot(angle, angle);
+  }
 };
 
 using Rolling = std::variant<FreeRolling, ConstantRolling, SpringRolling>;

@@ -86,6 +86,10 @@ struct TangentialSpring {
                          damping_ratio * normal.damping(s.touching.mass), friction * s.normal_force);
   }
 
+  double energy(const Touching<double>& /*c*/, Vec3 displacement) const {  // of the spring, J
+    return 0.5 * stiffness * dot(displacement, displacement);
+  }
+
   static TangentialSpring from_normal(double friction, const LinearSpringDashpot& normal, double stiffness_ratio = 2.0 / 7,
                                       double damping_ratio = 0.5) {
     return {friction, stiffness_ratio * normal.stiffness, damping_ratio, normal};
@@ -109,6 +113,9 @@ struct Mindlin {
     const Real slope = 8 * modulus * sqrt(s.touching.radius * s.touching.overlap);
     const Real damping = 2 * std::sqrt(5.0 / 6) * damping_share * sqrt(slope * s.touching.mass);
     return stick_or_slip<Real>(displacement, s.velocity, s.dt, 2.0 / 3 * slope, damping, friction * s.normal_force);
+  }
+  double energy(const Touching<double>& c, Vec3 displacement) const {  // of the spring, J
+    return 8.0 / 3 * modulus * std::sqrt(c.radius * c.overlap) * dot(displacement, displacement);
   }
 };
 

@@ -250,6 +250,7 @@ void Dem::advance(int substeps, double dt, std::optional<double> time) {
         particles_.rows.data(), particles_.spin_z.data(), particles_.owned, force_.data(), ghosts_.shifts().data(), dt, now_};
     contacts(bodies);
     walls(bodies, time ? std::optional(*time + substep * dt) : std::nullopt);
+    if (opening_) open_account();
     keep_list_valid(move(dt), dt);
   }
 }
@@ -269,6 +270,7 @@ void Dem::walls(const Bodies& bodies, std::optional<double> time) {
   if (walls_.size() > 0) {
     walls_.meet(setup_, particles_, std::span(place_).first(particles_.owned), time, now_);
     result.note(add_wall_forces(walls_, setup_, particles_, bodies, laws_, loads_));
+    power_of_walls_ = walls_.take_power();
   }
   ++loaded_;
   deepest_ = std::max(deepest_, result.deepest);
@@ -279,11 +281,14 @@ void Dem::walls(const Bodies& bodies, std::optional<double> time) {
 bool Dem::move(double dt) {
   const PhaseTimer::Scope scope(timer_, Phase::integration, particles_.owned);
   bool far = false;
+  energy_.given -= power_of_walls_ * dt;
   for (std::size_t type = 0; type < cells_.size(); ++type) {
     const auto with = [&]<GasForce gas>() {
       const auto run = [&]<bool... parts>(std::integer_sequence<bool, parts...>) {
-        far |= integrate<gas, parts...>(setup_, setup_.types[type], cells_[type].first(), cells_[type].last(), particles_,
-                                        force_.data(), place_.data(), 0.5 * setup_.skin, dt);
+        const Moved moved = integrate<gas, parts...>(setup_, setup_.types[type], cells_[type].first(), cells_[type].last(),
+                                                     particles_, force_.data(), place_.data(), 0.5 * setup_.skin, dt);
+        far |= moved.far;
+        energy_.given += moved.work;
       };
       with_constants(run, std::integer_sequence<bool>{}, setup_.rotation, setup_.verlet, setup_.types[type].distributed);
     };

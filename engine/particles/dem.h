@@ -53,6 +53,16 @@ class Dem {
   // Largest overlap since the last take, over the sum of the two radii (on a wall the diameter), this rank.
   double take_max_overlap();
   double max_overlap() const { return deepest_; }
+  // What contacts give and hold. Opened at the start of the next sub-step; collective of none.
+  struct Energy {
+    double given = 0;   // work of the contacts on the particles since then, less that of walls that move, this rank, J
+    double stored = 0;  // in springs at its opening, this rank (half of a pair across ranks), J
+    double bound = 0;   // less the work that attraction could do, in the same contacts: below 0, J
+    double created =
+        0;  // by contacts while the account before was open: given + stored + bound at its end less those at its start
+  };
+  void open_energy_account() { opening_ = true; }
+  const Energy& energy_account() const { return energy_; }
   // Touching pairs in the last sub-step; a pair across ranks is counted by one of them.
   std::int64_t contact_count() const { return contacts_; }
   // Where the tuning of the skin stands; a checkpoint holds it too.
@@ -105,6 +115,7 @@ class Dem {
   void keep_list_valid(bool far, double dt);
   void contacts(const Bodies& bodies);
   void walls(const Bodies& bodies, std::optional<double> time);
+  void open_account();
   bool move(double dt);
   void look_for_lost(double dt);
   bool judge(std::size_t row, double dt);
@@ -128,6 +139,9 @@ class Dem {
   double now_ = 0;               // number of the last sub-step
   double deepest_ = 0;
   std::int64_t contacts_ = 0, rebuilds_ = 0;
+  Energy energy_;
+  bool opening_ = false, opened_ = false;
+  double power_of_walls_ = 0;        // in the sub-step, W
   std::vector<Newcomer> newcomers_;  // of this rank, until the list is rebuilt
   Departed departed_;
   Failure failure_;

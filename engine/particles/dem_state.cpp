@@ -121,6 +121,17 @@ double Dem::take_max_overlap() {
   return std::exchange(deepest_, 0);
 }
 
+// After the contacts of a sub-step have been found, before it moves anything.
+void Dem::open_account() {
+  opening_ = false;
+  const Bodies bodies{
+      particles_.rows.data(), particles_.spin_z.data(), particles_.owned, force_.data(), ghosts_.shifts().data(), 0, now_};
+  const ContactEnergy held = contact_energy(list_, faces_, walls_, setup_, particles_, bodies, laws_);
+  const double created = energy_.given + held.stored + held.bound - energy_.stored - energy_.bound;
+  energy_ = {0, held.stored, held.bound, opened_ ? created : 0};
+  opened_ = true;
+}
+
 double Dem::kinetic_energy() const {
   double energy = 0;
   for (std::size_t i = 0; i < particles_.owned; ++i) {

@@ -24,6 +24,15 @@ WallResult add_face_forces(PairList& list, const std::array<Plane, 6>& faces, co
 WallResult add_wall_forces(Walls& walls, const DemSetup& setup, const ParticleStore& particles, const Bodies& bodies,
                            const ContactLaws& laws, std::vector<WallLoad>& loads);
 
+// What contacts hold that touch, or attract each other, at the places of the particles; memories are those of sub-step
+// bodies.now.
+struct ContactEnergy {
+  double stored = 0;  // in springs, J
+  double bound = 0;   // potential of attraction, below 0, J
+};
+ContactEnergy contact_energy(PairList& list, const std::array<Plane, 6>& faces, Walls& walls, const DemSetup& setup,
+                             const ParticleStore& particles, const Bodies& bodies, const ContactLaws& laws);
+
 // Calls sweep(sizes) with what is known of the sizes of a group's pairs.
 template <class Sweep>
 void with_sizes(const PairList::Group& group, const DemSetup& setup, const ParticleStore& particles, Sweep sweep) {

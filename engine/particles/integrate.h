@@ -18,6 +18,11 @@
 
 namespace bedflow {
 
+struct Moved {
+  bool far = false;  // a particle is further than the limit (m) from its place, or not a number
+  double work = 0;   // that the contacts have done on the particles: Σ force · mean velocity · dt, torques too, J
+};
+
 namespace rows {
 
 constexpr Pack<8> spread(double position, double velocity, double spin) {
@@ -31,10 +36,10 @@ inline Pack<8> velocity_at_position(Pack<8> row) {
 }  // namespace rows
 
 // Advances the particles [first, last), all of one type, by dt (s) and sets their forces back to 0. place: of the last rebuild,
-// and one more. Returns whether a particle is further than `limit` (m) from its place, or not a number.
+// and one more.
 template <GasForce gas, bool rotation, bool verlet, bool distributed>
-bool integrate(const DemSetup& setup, const ParticleType type, std::size_t first, std::size_t last, ParticleStore& particles,
-               ForceRow* const force, const Vec3* const place, double limit, double dt) {
+Moved integrate(const DemSetup& setup, const ParticleType type, std::size_t first, std::size_t last, ParticleStore& particles,
+                ForceRow* const force, const Vec3* const place, double limit, double dt) {
   ParticleRow* const row = particles.rows.data();
   double* const spin_z = particles.spin_z.data();
   const double* const radius = particles.radius.data();
@@ -45,6 +50,8 @@ bool integrate(const DemSetup& setup, const ParticleType type, std::size_t first
   const Vec3 fall = dt * setup.gravity;
   const Pack<8> falls{0, 0, 0, fall.x, fall.y, fall.z, 0, 0}, drift = rows::spread(dt, 0, 0);
   auto far = Pack<4>{} != 0;
+  Pack<8> power{};  // in the lanes of the velocity and the spin
+  double power_z = 0;
   for (std::size_t i = first; i < last; ++i) {
     if constexpr (distributed) {
       const double mass = type.mass_of(radius[i]);
@@ -72,20 +79,25 @@ bool integrate(const DemSetup& setup, const ParticleType type, std::size_t first
       }
       before = force[i];
       before.known = 1;
+      power += contact * (state + 0.5 * kick);
       state += drift * rows::velocity_at_position(state + 0.5 * kick) + kick;
     } else {
+      power += contact * (state + 0.5 * kick);
       state += kick;
       state += drift * rows::velocity_at_position(state);
     }
     store(&row[i].position.x, state);
-    if constexpr (rotation) spin_z[i] += per_inertia * turn;
+    if constexpr (rotation) {
+      power_z += force[i].torque_z * (spin_z[i] + 0.5 * per_inertia * turn);
+      spin_z[i] += per_inertia * turn;
+    }
     force[i] = {};
     const Pack<4> moved = __builtin_shufflevector(state, state, 0, 1, 2, 3) - load<4>(&place[i].x), square = moved * moved;
     const Pack<4> distance2 = square + __builtin_shufflevector(square, square, 1, 2, 0, 0) +
                               __builtin_shufflevector(square, square, 2, 0, 1, 0);  // in lane 0
     far |= !(distance2 <= limit * limit);
   }
-  return (bits_of(far) & 1) != 0;
+  return {(bits_of(far) & 1) != 0, dt * (power[3] + power[4] + power[5] + power[6] + power[7] + power_z)};
 }
 
 }  // namespace bedflow

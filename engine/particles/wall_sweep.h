@@ -34,11 +34,14 @@ struct WallContact {
   Vec3 arm;                         // from the wall's point of reference to the contact
   Vec3 *wall_force, *wall_torque;   // that the wall has received; no torque on a face of the box
   MemoryRow *displacement, *angle;  // where the laws have a memory
+  Vec3 wall_velocity{};             // at the contact, m/s
+  double* power = nullptr;          // that the walls which move have put into the particles, W
 
   void push(const Bodies& bodies, Vec3 force, Vec3 torque) const {
     bodies.force[particle].add(force, torque);
     *wall_force -= force;
     if (wall_torque) *wall_torque -= cross(arm, force);
+    if (power) *power += dot(force, wall_velocity);
   }
 };
 
@@ -118,6 +121,7 @@ void sweep_walls_rolling(const Each& each, const ParticleStore& particles, const
     const Vec3 torque = with_memory(rolling[c.law], rolls, c.angle, bodies.now);
     c.push(bodies, {}, torque);
     if (c.wall_torque) *c.wall_torque -= torque;
+    if (c.power) *c.power += dot(torque, c.wall_spin);
   });
 }
 

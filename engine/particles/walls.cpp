@@ -114,7 +114,7 @@ void Walls::meet_part(const Shape& shape, std::size_t index, const DemSetup& set
     }
     for (const Touch& touch : touches_.contacts(rise)) {
       const Vec3 n = -part.frame.turned(touch.normal), at = x + touch.distance * n;
-      const Vec3 velocity = particles.velocity(i) - part.pose.velocity_at(at);
+      const Vec3 wall_velocity = part.pose.velocity_at(at), velocity = particles.velocity(i) - wall_velocity;
       const std::size_t type = particles.type.empty() ? 0 : particles.type[i];
       const double overlap = radius - touch.distance;
       met_.push_back({{i,
@@ -129,7 +129,8 @@ void Walls::meet_part(const Shape& shape, std::size_t index, const DemSetup& set
                        nullptr,
                        nullptr,
                        nullptr,
-                       nullptr},
+                       nullptr,
+                       wall_velocity},
                       static_cast<std::uint32_t>(index),
                       {},
                       {}});

@@ -9,6 +9,7 @@
 #pragma once
 
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "geometry/wall.h"
@@ -40,12 +41,15 @@ class Walls {
       WallLoad& load = loads[box_faces_count + meeting.wall];
       c.wall_force = &load.force;
       c.wall_torque = &load.torque;
+      c.power = &power_;
       c.displacement = &meeting.displacement;
       c.angle = &meeting.angle;
       take(c);
     }
     return result;
   }
+  // What the walls have put into the particles since the last take, the sum over the sub-steps, W.
+  double take_power() { return std::exchange(power_, 0); }
   // The name of a wall that a place is on the wrong side of at the time of the last meet(); null: of none,
   // or there was none since the last load().
   const std::string* passed(Vec3 place) const;
@@ -87,6 +91,7 @@ class Walls {
   std::size_t behind_ = 0;             // of before_: those of earlier particles
   Touches touches_;
   bool listed_ = false, passed_ = false;
+  double power_ = 0;
 };
 
 }  // namespace bedflow

@@ -10,6 +10,7 @@
 #include <functional>
 #include <sstream>
 
+#include "run.h"
 #include "support/scene.h"
 
 namespace bedflow {
@@ -194,10 +195,38 @@ std::vector<Extreme> extremes() {
       {"AGasStepATau", {.time = "end: 1"}},
       {"AGasStepATwentiethOfTau", {.time = "end: 1 step: 3.6e-6"}, 200},
       {"TwoHundredSubStepsAGasStep", {.stiffness = 5e4, .time = "end: 1 step: 7.2e-5"}},
+      {"OneSubStepAGasStep", {.time = "end: 1 substeps: 1"}},
+      {"TwoHundredSubStepsByTheirNumber", {.stiffness = 5e4, .time = "end: 1 substeps: 200"}},
+      {"TwoHundredSubStepsSoft", {.time = "end: 1 substeps: 200"}, 100},
+      {"TwoHundredSubStepsSemiImplicit", {.coupling = semi_implicit, .time = "end: 1 substeps: 200"}, 100},
+      {"FractionAtItsFloor",
+       {.coupling = "gidaspow_blended {} hat {} explicit {} gas_fraction_floor: 0.6",
+        .seeds = "lattice { count { x: 12 y: 30 z: 8 } }"}},
+      {"FractionBelowTheGuard",
+       {.seeds = "lattice { count { x: 12 y: 30 z: 8 } }", .more = "guard { gas_fraction: 0.6 }"},
+       1,
+       End::stopped,
+       "guard.gas_fraction"},
       {"Verlet", {.restitution = 1, .tangential = "spring { friction: 2 }", .integrator = "velocity_verlet {}"}},
   };
 }
 INSTANTIATE_TEST_SUITE_P(Of, Extremes, testing::ValuesIn(extremes()), [](const auto& scene) { return scene.param.name; });
+
+// A run that the guard stops leaves the state before, from which another case or finer steps may go on.
+TEST(Stopped, RunsLeaveTheirLastGoodCheckpoint) {
+  const Comm self = Comm::self();
+  const TestFolder folder(self);
+  std::ofstream(folder.path() / "case.txtpb") << text_of({.inflow = 200});
+  EXPECT_EQ(run(self, {folder.path(), 0, std::nullopt}), Reason::diverged);
+  std::vector<std::string> faults;
+  const std::optional<CheckpointInfo> last = newest_good_checkpoint(self, folder.path() / "checkpoints", faults);
+  ASSERT_TRUE(last);
+  EXPECT_TRUE(faults.empty());
+  PhaseTimer timer;
+  Simulation simulation(make_plan(read_scene(folder.path() / "case.txtpb"), 1), self, timer);
+  simulation.restore(CheckpointReader(self, last->path));
+  expect_sound(simulation, 300, 1);
+}
 
 // Implicit convection has no limit: a channel that is fed at one half of its floor stays bounded at every Courant number.
 TEST(Limits, OfImplicitConvectionAreNone) {

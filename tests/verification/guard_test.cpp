@@ -28,10 +28,10 @@ std::string impact(double speed, const std::string& guard, const std::string& mo
 }
 
 // Steps until the guard finds something; what it says.
-std::string trouble(const std::string& text, int steps) {
+std::string trouble(const Scene& scene, int steps) {
   const Comm world = Comm::world();
   PhaseTimer timer;
-  Simulation simulation(make_plan(scene_of(world, text), world.size()), world, timer);
+  Simulation simulation(make_plan(scene, world.size()), world, timer);
   simulation.seed();
   for (int s = 0; s < steps; ++s) {
     simulation.step();
@@ -39,6 +39,10 @@ std::string trouble(const std::string& text, int steps) {
   }
   EXPECT_TRUE(!simulation.failure() || simulation.failure().reason == Reason::diverged);
   return simulation.failure().message;
+}
+
+std::string trouble(const std::string& text, int steps) {
+  return trouble(scene_of(Comm::world(), text), steps);
 }
 
 // On every rank that has seen it, and one has.
@@ -100,6 +104,33 @@ TEST(Guard, WhatIsNotANumberIsTrouble) {
   Failure of_fraction;
   watch_fraction({}, grid, {std::nan(""), {0, 0, 0}}, of_fraction);
   EXPECT_EQ(of_fraction.reason, Reason::diverged);
+}
+
+// A cube of 6 × 6 × 6 elastic spheres between walls that press them by a hundredth of a diameter. Every row is a chain of
+// springs: its fastest swing has ω = 2 √(k/m), symplectic Euler is stable up to dt = 2/ω, and τ = π √(m/2k): with fewer than π/√2
+// = 2.22 sub-steps in τ it blows up.
+Scene pressed(double steps_per_collision, double limit) {
+  Scene scene = scene_of(Comm::world(), R"(name: "pressed" domain { size { x: 0.012 y: 0.012 z: 0.012 } } gravity { y: -9.81 }
+    particles { diameter: 0.002 density: 1000 linear_spring_dashpot { stiffness: 500 restitution: 1 } frictionless {} symplectic_euler {}
+      lattice { count { x: 6 y: 6 z: 6 } } } time { end: 10 } )");
+  PlacedSeeds spheres;
+  for (int i = 0; i < 216; ++i) {
+    const Vec3 place{i % 6 + 0.5, i / 6 % 6 + 0.5, i / 36 + 0.5};
+    spheres.push_back({.position = 0.99 * 0.002 * place, .diameter = 0.002});
+  }
+  scene.particles->regions[0].seeds = spheres;
+  scene.size = 0.99 * scene.size;
+  scene.particles->steps_per_collision = steps_per_collision;  // fewer than a case may ask for
+  scene.substeps = 3;
+  scene.guard.energy = limit;
+  return scene;
+}
+
+TEST(Guard, NamesEnergyThatContactsCreateBeforeAllElse) {
+  EXPECT_EQ(trouble(pressed(2.5, 0.05), 3000), "");
+  expect_said(trouble(pressed(2, 0.2), 3000),
+              {"contacts have created ", " J, ", "guard.energy is 0.2", "the fastest is particle ", "steps_per_collision"});
+  EXPECT_THAT(trouble(pressed(2, 0), 3000), testing::Not(HasSubstr("guard.energy")));  // found later, by others
 }
 
 // A job folder of its own for a case, and what its event log warns of.
