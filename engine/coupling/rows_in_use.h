@@ -21,9 +21,9 @@ class RowsInUse {
     std::vector<char> any(rows());
     for (std::size_t row = 0; row < any.size(); ++row) {
       const double* value = solids.data() + static_cast<std::ptrdiff_t>(row) * stride_;
-      double sum = 0;
-      for (int i = 0; i < stride_; ++i) sum += value[i];
-      any[row] = sum != 0;
+      int found = 0;
+      for (int i = 0; i < stride_; ++i) found |= value[i] != 0;
+      any[row] = found != 0;
     }
     widen(any, 1, cells_[0]);
     widen(any, cells_[0], cells_[1]);
