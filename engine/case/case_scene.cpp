@@ -301,7 +301,8 @@ Scene make_scene(const v1::Case& from) {
     scene.monitors.push_back(std::move(setup));
   }
   const v1::Guard& guard = from.guard();
-  scene.guard = {guard.overlap(), guard.move(), guard.gas_fraction(), guard.courant(), guard.energy(), static_cast<int>(guard.retries())};
+  scene.guard = {guard.overlap(), guard.move(),   guard.gas_fraction(),
+                 guard.courant(), guard.energy(), static_cast<int>(guard.retries())};
   if (from.output().has_interval()) scene.plot_interval = from.output().interval();
   return scene;
 }
