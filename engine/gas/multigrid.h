@@ -9,7 +9,7 @@
 //
 // which is Galerkin's operator of constant interpolation, with the over-correction of smooth errors taken out (Braess 1995): it
 // couples six cells again, and whatever the coefficients jump by, no error is corrected by more than the distances' ratio. Cells
-// that are narrow in one direction are not joined in it but smoothed by lines (multigrid_lines.cpp), unless these are cut by
+// that are narrow along y or z are not joined in it but smoothed by lines (multigrid_lines.cpp), unless these are cut by
 // ranks or close on themselves. Where they are, a barrier inside a pair counts too, in series, to a third at the least: a
 // bubble's thin roof still stands on the coarse levels. Smoothing is Gauss–Seidel in red and black, over-relaxed (Yavneh 1996),
 // in reverse order after the coarse correction, and more of it on coarser levels, which cost little. M is symmetric and positive
@@ -62,7 +62,7 @@ class Multigrid {
 
     std::ptrdiff_t index(int i, int j, int k) const { return (i + 1) + stride(1) * (j + 1) + stride(2) * (k + 1); }
     std::ptrdiff_t section() const {  // of lines that are solved together, and a row before and after it
-      return lines < 0 ? 0 : static_cast<std::ptrdiff_t>(cells[lines] + 2) * cells[lines == 0 ? 1 : 0];
+      return lines < 0 ? 0 : static_cast<std::ptrdiff_t>(cells[lines] + 2) * cells[0];
     }
     Int3 first() const;              // index of the block's first cell in the box
     float edge(int d, int i) const;  // of a cell or a ghost; 0 beyond the box

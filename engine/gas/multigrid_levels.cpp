@@ -11,8 +11,10 @@ namespace {
 
 constexpr std::int64_t most_gathered =
     4096;                                  // cells: to solve them on every rank costs no more than the messages otherwise would
-constexpr std::int64_t most_solved = 100;  // cells of which the inverse matrix is taken: smoothing them costs more
-constexpr double longest = 1.5;            // edge over the narrowest one at which cells are still joined in its direction
+constexpr std::int64_t most_solved = 100;  // cells of which the inverse matrix is taken: smoothing them costs more,
+constexpr std::int64_t inversion_per_cell =
+    70;                            // as long as the inversion takes at most so many operations a cell of the finest grid
+constexpr double longest = 1.5;    // edge over the narrowest one at which cells are still joined in its direction
 constexpr double flat = 2;         // the other edges over the narrowest one, from which on its lines are smoothed as a whole
 constexpr double half_sweeps = 3;  // on the finest level
 constexpr double growth = 0.5;     // half sweeps grow with this power of the ratio of cells, and
@@ -74,7 +76,9 @@ Multigrid::Multigrid(const Decomposition& decomposition, const Grid& grid) : dec
     add_level(edges, place, whole);
     Level& level = levels_.back();
     const std::int64_t cells = static_cast<std::int64_t>(level.global[0]) * level.global[1] * level.global[2];
-    if (whole && cells <= most_solved) break;
+    if (whole && cells <= most_solved &&
+        cells * cells * cells <= inversion_per_cell * grid_.global[0] * grid_.global[1] * grid_.global[2])
+      break;
     const bool stuck = !choose_joined(level, whole);
     if (!whole && (stuck || cells <= most_gathered)) {
       for (Edges& e : edges) e = {chained(e)};
@@ -125,9 +129,12 @@ void Multigrid::add_level(const std::array<Edges, 3>& edges, Int3 place, bool wh
     field->assign(size, 0);
 }
 
-// In which all lines lie within this rank's block, and cells are flat; -1: there is none.
+// In which all lines lie within this rank's block, and cells are flat; -1: there is none. Not along x, nor in a narrow box: lines
+// beside each other fill the registers, and joining costs less where they do not.
 int Multigrid::narrow_direction(const Level& level, bool whole) const {
-  for (int d = 0; d < 3; ++d) {
+  constexpr int widest_register = 16;
+  if (grid_.global[0] < widest_register) return -1;
+  for (int d = 1; d < 3; ++d) {
     if (level.global[d] == 1 || decomposition_.periodic(d) || !(whole || decomposition_.ranks()[d] == 1)) continue;
     const double edge = decomposition_.size()[d] / level.global[d];
     bool narrow = true, others = false;

@@ -29,9 +29,8 @@ void Multigrid::factor_lines(Level& level) const {
 void Multigrid::relax_lines(Level& level, int colour) {
   constexpr float over = 1.1f;
   fill_ghosts(level);
-  const int along = level.lines, across = along == 0 ? 1 : 0, other = 3 - along - across, n = level.cells[across];
-  const std::ptrdiff_t s = level.stride(along), sa = level.stride(across), sx = level.stride(0), sy = level.stride(1),
-                       sz = level.stride(2);
+  const int along = level.lines, other = 3 - along, n = level.cells[0];  // lines that stand beside each other along x at once
+  const std::ptrdiff_t s = level.stride(along), sy = level.stride(1), sz = level.stride(2);
   const float *cx = level.coupling[0].data(), *cy = level.coupling[1].data(), *cz = level.coupling[2].data();
   const float *link = level.coupling[along].data(), *inverse = level.inverse.data(), *b = level.b.data();
   float* x = level.x.data();
@@ -43,37 +42,25 @@ void Multigrid::relax_lines(Level& level, int colour) {
     change += n;
     for (int m = 0; m < level.cells[along]; ++m, change += n) {
       const std::ptrdiff_t from = first + m * s;
-      const auto eliminate = [=](std::ptrdiff_t step) {
 #pragma GCC ivdep
-        for (int i = 0; i < n; ++i) {
-          const std::ptrdiff_t c = from + i * step;
-          const float here = x[c];
-          const float lack = b[c] + cx[c] * (x[c - sx] - here) + cx[c + sx] * (x[c + sx] - here) + cy[c] * (x[c - sy] - here) +
-                             cy[c + sy] * (x[c + sy] - here) + cz[c] * (x[c - sz] - here) + cz[c + sz] * (x[c + sz] - here);
-          change[i] = inverse[c] * (lack + link[c] * change[i - n]);
-        }
-      };
-      if (sa == 1)
-        eliminate(1);
-      else
-        eliminate(sa);
+      for (int i = 0; i < n; ++i) {
+        const std::ptrdiff_t c = from + i;
+        const float here = x[c];
+        const float lack = b[c] + cx[c] * (x[c - 1] - here) + cx[c + 1] * (x[c + 1] - here) + cy[c] * (x[c - sy] - here) +
+                           cy[c + sy] * (x[c + sy] - here) + cz[c] * (x[c - sz] - here) + cz[c + sz] * (x[c + sz] - here);
+        change[i] = inverse[c] * (lack + link[c] * change[i - n]);
+      }
     }
     std::fill_n(change, n, 0.0f);
     for (int m = level.cells[along] - 1; m >= 0; --m) {
       change -= n;
       const std::ptrdiff_t from = first + m * s;
-      const auto substitute = [=](std::ptrdiff_t step) {
 #pragma GCC ivdep
-        for (int i = 0; i < n; ++i) {
-          const std::ptrdiff_t c = from + i * step;
-          change[i] += inverse[c] * link[c + s] * change[i + n];
-          x[c] += (((i ^ odd) & 1) == 0 ? over : 0) * change[i];
-        }
-      };
-      if (sa == 1)
-        substitute(1);
-      else
-        substitute(sa);
+      for (int i = 0; i < n; ++i) {
+        const std::ptrdiff_t c = from + i;
+        change[i] += inverse[c] * link[c + s] * change[i + n];
+        x[c] += (((i ^ odd) & 1) == 0 ? over : 0) * change[i];
+      }
     }
   }
 }

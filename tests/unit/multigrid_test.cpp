@@ -17,8 +17,8 @@ std::vector<Kind> kinds() {
           {.cells = {15, 45, 9}, .drag = 1e3},
           {.cells = {16, 12, 20}, .edge = {1, 8, 8}},
           {.cells = {16, 12, 20}, .edge = {8, 1, 3}, .open = false, .drag = 100},
-          {.cells = {14, 18, 20}, .edge = {5, 5, 1}, .open = false, .drag = 1e6},
-          {.cells = {9, 40, 7}, .edge = {8, 1, 8}, .periodic = {true, false, true}, .drag = 1e3},
+          {.cells = {17, 18, 20}, .edge = {5, 5, 1}, .open = false, .drag = 1e6},
+          {.cells = {17, 40, 7}, .edge = {8, 1, 8}, .periodic = {true, false, true}, .drag = 1e3},
           {.cells = {9, 15, 5}, .periodic = all_periodic, .bed = false},
           {.cells = {4, 40, 3}, .periodic = {false, true, true}, .drag = 10}};
 }
@@ -114,14 +114,13 @@ TEST(Multigrid, IterationsDoNotGrowWithTheGrid) {
                                                   {{.open = false, .drag = 1e6}, 14},
                                                   {{.edge = {1, 8, 1}, .drag = 1e3}, 10},
                                                   {{.edge = {8, 1, 1}, .drag = 1e3}, 12},
+                                                  {{.edge = {1, 8, 8}, .drag = 1e3}, 11},
                                                   // Flat cells, by lines:
                                                   {{.edge = {8, 1, 8}, .bed = false}, 5},
                                                   {{.edge = {2, 1, 2}, .drag = 1e3}, 7},
                                                   {{.edge = {8, 1, 8}, .drag = 1e3}, 7},
                                                   {{.edge = {8, 1, 8}, .drag = 1e6}, 8},
-                                                  {{.edge = {8, 8, 1}, .drag = 1e3}, 9},
-                                                  {{.edge = {1, 8, 8}, .drag = 1e3}, 10},
-                                                  {{.edge = {1, 8, 8}, .drag = 1e6}, 14}};
+                                                  {{.edge = {8, 8, 1}, .drag = 1e3}, 9}};
   if (Comm::world().size() > 1) GTEST_SKIP() << "on one rank; the next test compares ranks";
   for (auto [kind, bound] : most) {
     std::string seen;
