@@ -4,6 +4,7 @@
 #include <google/protobuf/text_format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <filesystem>
 #include <iostream>
@@ -12,6 +13,7 @@
 
 #include "cases/ready_cases.h"
 #include "failure.h"
+#include "fidelity.h"
 
 namespace bedflow::client {
 
@@ -124,6 +126,13 @@ CaseRead read_any(const std::string& where) {
 void set_value(v1::Case& value, const std::string& assignment) {
   const auto equals = assignment.find('=');
   const std::string path = assignment.substr(0, equals);
+  if (path == "fidelity" && equals != assignment.npos) {  // who names it here means it, whatever the case says
+    std::string name = assignment.substr(equals + 1);
+    std::ranges::transform(name, name.begin(), [](unsigned char c) { return std::toupper(c); });
+    leave_open(value);
+    assign(value, field_of(value, path, assignment), name, assignment);
+    return complete(value);
+  }
   Message* message = &value;
   std::size_t start = 0;
   while (true) {

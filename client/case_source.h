@@ -9,8 +9,8 @@
 
 namespace bedflow::client {
 
-// "particles.random.count=100", "monitors[2].interval=0", "coupling.ergun" (chooses an arm). Throws Failure with the names
-// that the place has.
+// "particles.random.count=100", "monitors[2].interval=0", "coupling.ergun" (chooses an arm), "fidelity=FAST" (which decides all
+// that profiles choose). Throws Failure with the names that the place has.
 void set_value(v1::Case& value, const std::string& assignment);
 
 // `where` is a file, "-" for stdin, the name of a ready case, or that and a preset, as in "mueller@mfix-exa-2018". Assignments

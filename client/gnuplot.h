@@ -1,6 +1,7 @@
 // Pictures are drawn by gnuplot (package gnuplot-nox) through a pipe.
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <string>
 
@@ -9,6 +10,10 @@ namespace bedflow::client {
 struct PictureSize {
   int width, height;  // pixels
 };
+
+// For lines beside each other, told apart on white; taken up again from the first when they are over.
+inline constexpr std::array line_colours = {"#1f5fa8", "#e08214", "#1b7837", "#762a83", "#35978f", "#8c510a",
+                                            "#c51b7d", "#4d4d4d", "#5aae61", "#2b8cbe", "#bf812d", "#7f3b08"};
 
 // "set terminal" and "set output" for a PNG, and the look that all our pictures share.
 std::string picture_head(const std::filesystem::path& file, PictureSize size);

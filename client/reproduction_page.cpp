@@ -1,14 +1,13 @@
 // The page of a reproduced bed: tables in Markdown, a picture for each monitor that there is data of.
 #include <algorithm>
 #include <cmath>
-#include <ctime>
-#include <fstream>
 #include <functional>
 #include <map>
 #include <set>
 
 #include "failure.h"
 #include "gnuplot.h"
+#include "page.h"
 #include "reproduction.h"
 #include "statistics_table.h"
 #include "terminal.h"
@@ -159,12 +158,11 @@ std::string profile_table(const std::vector<const ReproducedRun*>& runs, const s
 }
 
 void draw_profiles(const std::filesystem::path& file, const std::vector<const ReproducedRun*>& runs, const std::string& monitor) {
-  constexpr const char* colours[] = {"#1f5fa8", "#e08214", "#1b7837", "#762a83", "#35978f", "#8c510a"};
   std::string blocks, draws;
   std::size_t index = 0;
   for (const auto* run : runs) {
     const Curve curve = curve_of(*profile_of(*run, monitor));
-    const std::string name = "$run" + std::to_string(index), colour = colours[index % std::size(colours)];
+    const std::string name = "$run" + std::to_string(index), colour = line_colours[index % line_colours.size()];
     blocks += name + " << EOD\n";
     for (std::size_t i = 0; i < curve.place.size(); ++i)
       blocks += number_text(1e3 * curve.place[i]) + " " + (std::isfinite(curve.value[i]) ? number_text(curve.value[i]) : "NaN") +
@@ -193,13 +191,6 @@ void draw_profiles(const std::filesystem::path& file, const std::vector<const Re
 }
 
 // ------------------------------------------------------------------------------------------------ the page
-
-std::string today() {
-  const std::time_t now = std::time(nullptr);
-  char text[16];
-  std::strftime(text, sizeof text, "%Y-%m-%d", std::gmtime(&now));
-  return text;
-}
 
 std::string runs_table(const std::vector<ReproducedRun>& runs) {
   std::string text =
@@ -245,12 +236,9 @@ std::string condition_text(const std::filesystem::path& folder, const std::vecto
 
 std::filesystem::path write_page(const std::filesystem::path& folder, const std::string& name, const std::string& command,
                                  const std::vector<ReproducedRun>& runs) {
-  std::error_code failed;
-  std::filesystem::create_directories(folder, failed);
-  if (failed) throw Failure(Exit::other, "the folder " + folder.string() + " cannot be made: " + failed.message());
+  make_folder(folder);
   std::string text =
-      "# " + name + ", reproduced\n\nMade by `" + command + "`, bedflow " BEDFLOW_VERSION ", " + today() + ".\n\n" +
-      runs_table(runs) +
+      "# " + name + ", reproduced\n\n" + made_by(command) + "\n" + runs_table(runs) +
       "\nTwo values a ± δa and b ± δb agree when (|a − b| − δa − δb) / ((a + b)/2) ≤ 0, the measure of arXiv 1909.02067; "
       "otherwise they are that far apart. Published values without an interval count as exact. Profiles of ours are "
       "averaged with their mirror image.\n";
@@ -264,10 +252,7 @@ std::filesystem::path write_page(const std::filesystem::path& folder, const std:
     text += condition_text(folder, of_it);
   }
   auto page = folder / (name + ".md");
-  std::ofstream file(page);
-  file << text;
-  file.close();
-  if (!file) throw Failure(Exit::limit, "the page " + page.string() + " could not be written");
+  write_text(page, text);
   return page;
 }
 

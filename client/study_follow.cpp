@@ -11,10 +11,11 @@ using namespace std::chrono_literals;
 
 std::string progress_of(const v1::Study& study) {
   int ended = 0, running = 0;
-  std::string now;
+  std::string now, suspended;
   for (int i = 0; i < study.runs_size(); ++i) {
     const auto& run = study.runs(i);
-    if (run.has_state() && (is_final(run.state()) || run.interval_met())) ++ended;
+    if (has_ended(run)) ++ended;
+    if (run.state() == v1::STATE_SUSPENDED && !run.interval_met()) suspended += " " + run.job();
     if (run.state() != v1::RUNNING || run.interval_met()) continue;
     if (running++ < 3)
       now += (now.empty() ? "; now " : ", ") + point_name(study.spec(), i) + " at " + number_text(std::round(100 * run.done())) +
@@ -22,6 +23,7 @@ std::string progress_of(const v1::Study& study) {
   }
   if (running > 3) now += " and " + std::to_string(running - 3) + " more";
   if (ended == 0 && running == 0 && study.has_packing_job()) now = "; the particles are being packed";
+  if (!suspended.empty()) now += "; suspended, resume to go on:" + suspended;
   return std::to_string(ended) + " of " + std::to_string(study.runs_size()) + " runs have ended" + now;
 }
 

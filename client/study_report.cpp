@@ -46,9 +46,12 @@ double relative(const v1::Study& study, int quantity, double value) {
   return 100 * value / std::abs(reference_of(study, quantity).mean());
 }
 
-std::string short_text(double value, const char* format = "%.2g") {
+std::string short_text(double value, int digits = 2) {
   char text[32];
-  std::snprintf(text, sizeof text, format, value);
+  if (std::abs(value) >= std::pow(10, digits))
+    std::snprintf(text, sizeof text, "%.0f", value);
+  else
+    std::snprintf(text, sizeof text, "%.*g", digits, value);
   return text;
 }
 
@@ -59,7 +62,7 @@ std::string error_text(const v1::Study& study, int point, int quantity) {
   const auto& error = run.errors(quantity);
   std::string text = short_text(relative(study, quantity, error.value())) + " %";
   if (error.has_half_width()) text += " ± " + short_text(relative(study, quantity, error.half_width()));
-  return text + (error.equal() ? ", equal" : "");
+  return text + (error.equal() ? ", equal" : "") + (quantity < run.on_front_size() && run.on_front(quantity) ? " *" : "");
 }
 
 std::string run_state(const v1::StudyRun& run) {
@@ -117,6 +120,10 @@ std::string plot_row(const v1::Study& study, int point, int quantity) {
 
 }  // namespace
 
+bool has_ended(const v1::StudyRun& run) {
+  return run.interval_met() || (run.has_state() && is_final(run.state()) && run.state() != v1::STATE_SUSPENDED);
+}
+
 std::string quantity_name(const v1::StudyQuantity& quantity) {
   return quantity.monitor() + (quantity.fluctuation() ? " fluctuation" : "");
 }
@@ -131,38 +138,42 @@ std::string point_name(const v1::StudySpec& spec, int point) {
   return name.empty() ? "reference" : name;
 }
 
-std::string study_table(const v1::Study& study) {
+std::string reference_text(const v1::Study& study) {
   const auto& spec = study.spec();
-  std::vector<std::string> columns(spec.axes().begin(), spec.axes().end());
-  columns.insert(columns.end(), {"state", "CPU s/s", "speed-up"});
+  std::string text;
+  for (int a = 0; a < spec.axes_size(); ++a)
+    text += (a ? " " : "") + spec.axes(a) + "=" + spec.points(static_cast<int>(spec.reference())).values(a);
+  return text;
+}
+
+Table study_table(const v1::Study& study) {
+  const auto& spec = study.spec();
+  std::vector<std::string> columns = {"run", "state", "CPU s/s", "speed-up"};
   for (const auto& quantity : spec.quantities()) {
     columns.push_back(quantity_name(quantity) + " ± 95 %");
     columns.emplace_back("difference");
-    columns.emplace_back("front");
   }
   Table table(columns);
   const auto& reference = study.runs(static_cast<int>(spec.reference()));
   for (int i = 0; i < study.runs_size(); ++i) {
     const auto& run = study.runs(i);
-    std::vector<Cell> row;
-    for (const auto& value : spec.points(i).values()) row.emplace_back(value);
-    row.emplace_back(run_state(run));
-    row.emplace_back(run.has_cost() ? short_text(run.cost().cpu_seconds(), "%.3g") : "-");
+    std::vector<Cell> row = {point_name(spec, i), run_state(run)};
+    row.emplace_back(run.has_cost() ? short_text(run.cost().cpu_seconds(), 3) : "-");
     const bool comparable = run.has_cost() && reference.has_cost();
-    row.emplace_back(comparable ? short_text(reference.cost().cpu_seconds() / run.cost().cpu_seconds(), "%.3g") + " x" : "-");
+    row.emplace_back(comparable ? short_text(reference.cost().cpu_seconds() / run.cost().cpu_seconds(), 3) + " x" : "-");
     for (int q = 0; q < spec.quantities_size(); ++q) {
       row.emplace_back(q < run.quantities_size() ? estimate_text(run.quantities(q)) : "-");
       row.emplace_back(error_text(study, i, q));
-      row.emplace_back(q < run.on_front_size() && run.on_front(q) ? "*" : "");
     }
     table.add(std::move(row));
   }
-  return table.text(Format::table);
+  return table;
 }
 
 void print_study(const v1::Study& study, Format format) {
   if (format == Format::table) {
-    print_data(study_table(study));
+    print_data(study_table(study).text(format));
+    say("reference: " + reference_text(study) + "\n* no other run is both cheaper and closer");
     if (!study.message().empty()) say(study.message());
     return;
   }
@@ -172,8 +183,7 @@ void print_study(const v1::Study& study, Format format) {
 Table table_of(const std::vector<v1::Study>& studies) {
   Table table({"study", "name", "state", "runs", "ended", "created"});
   for (const auto& study : studies) {
-    const auto ended = std::ranges::count_if(
-        study.runs(), [](const auto& run) { return run.has_state() && (is_final(run.state()) || run.interval_met()); });
+    const auto ended = std::ranges::count_if(study.runs(), has_ended);
     table.add({study.id(), study.spec().name(), study_state_name(study.state()), static_cast<std::uint64_t>(study.runs_size()),
                static_cast<std::uint64_t>(ended), time_text(study.created_unix_nanos())});
   }
@@ -201,7 +211,7 @@ std::string study_plot(const v1::Study& study, const std::filesystem::path& file
     std::string front, draws;
     for (int i = 0; i < spec.points_size(); ++i)
       if (q < study.runs(i).on_front_size() && study.runs(i).on_front(q)) front += plot_row(study, i, q);
-    int index = 0;
+    std::size_t index = 0;
     for (const auto& line : lines) {
       std::vector<std::pair<double, std::string>> points;
       for (int i = 0; i < spec.points_size(); ++i) {
@@ -215,11 +225,10 @@ std::string study_plot(const v1::Study& study, const std::filesystem::path& file
       text += block + " << EOD\n";
       for (const auto& [cost, row] : points) text += row;
       text += "EOD\n";
-      const std::string colour = " lc " + std::to_string(index + 1);
-      draws += (draws.empty() ? "" : ", \\\n  ") + block + " using 1:2:3 with yerrorlines pt 7 ps 0.9 lw 1.3" + colour +
+      const std::string colour = " rgb \"" + std::string(line_colours[index % line_colours.size()]) + "\"";
+      draws += (draws.empty() ? "" : ", \\\n  ") + block + " using 1:2:3 with yerrorlines pt 7 ps 0.9 lw 1.3 lc" + colour +
                " title " + gnuplot_quoted(line) + ", \\\n  " + block +
-               " using 1:2:4 with labels left rotate by 45 offset 0.4,0.5 font \",10\" tc lt " + std::to_string(index + 1) +
-               " notitle";
+               " using 1:2:4 with labels left rotate by 45 offset 0.4,0.5 font \",10\" tc" + colour + " notitle";
       ++index;
     }
     text += "set title " + gnuplot_quoted(quantity_name(spec.quantities(q))) + " font \",15\"\n";

@@ -12,6 +12,7 @@
 #include "interrupt.h"
 #include "job_request.h"
 #include "study_follow.h"
+#include "study_page.h"
 #include "terminal.h"
 #include "vary.h"
 #include "verbs.h"
@@ -24,7 +25,7 @@ using namespace std::chrono_literals;
 
 struct StudyOptions : JobOptions {
   std::vector<std::string> vary, quantities, reference;
-  std::string name, data, plot;
+  std::string name, data, plot, page;
   std::optional<double> from, bin, interval;
   bool grid = false, own_packings = false, anew = false, knobs = false;
   Format format = Format::table;
@@ -116,7 +117,7 @@ void require_sound(const v1::Case& value, const std::string& point) {
   throw Failure(Exit::usage, "the case of " + point + " has faults", "bedflow reference", std::move(faults));
 }
 
-v1::StudySpec spec_of(const StudyOptions& options) {
+v1::StudySpec spec_of(const StudyOptions& options, const std::string& line) {
   if (options.vary.empty() || options.quantities.empty()) {
     throw Failure(
         Exit::usage,
@@ -127,6 +128,7 @@ v1::StudySpec spec_of(const StudyOptions& options) {
   if (!base.case_().has_name()) base.mutable_case_()->set_name("study");
   v1::StudySpec spec;
   spec.set_name(options.name.empty() ? base.case_().name() : options.name);
+  spec.set_command(line);
   *spec.mutable_job() = base.spec();
   if (options.interval) spec.mutable_stop()->set_relative(*options.interval / 100);
   if (options.own_packings) spec.set_same_packing(false);
@@ -158,11 +160,16 @@ v1::StudySpec spec_of(const StudyOptions& options) {
   return spec;
 }
 
-// ------------------------------------------------------------------------------------------------ those there are
+// ------------------------------------------------------------------------------------------------ what it says
 
-void draw(const v1::Study& study, const std::string& file) {
-  draw_picture(study_plot(study, file), file);
-  say("picture: " + file);
+template <class Options>
+void show(const v1::Study& study, const Options& options) {
+  print_study(study, options.format);
+  if (!options.plot.empty()) {
+    draw_picture(study_plot(study, options.plot), options.plot);
+    say("picture: " + options.plot);
+  }
+  if (!options.page.empty()) say("page: " + write_study_page(options.page, study).string());
 }
 
 Exit end_of(const v1::Study& study) {
@@ -182,7 +189,7 @@ Exit begin(const Program& program, const StudyOptions& options) {
     throw Failure(Exit::usage, "a case is missing", "bedflow study mueller --vary substeps=1,5,20 --quantity bed_height --end 4");
   Interrupt interrupt;
   v1::CreateStudyRequest request;
-  *request.mutable_spec() = spec_of(options);
+  *request.mutable_spec() = spec_of(options, program.line);
   request.set_request_id(new_request_id());
   std::unique_ptr<EmbeddedServer> own;
   if (!options.data.empty()) own = std::make_unique<EmbeddedServer>(options.data);
@@ -196,15 +203,14 @@ Exit begin(const Program& program, const StudyOptions& options) {
     say("\nthe study goes on; come back: " + come_back);
     return Exit::interrupted;
   }
-  print_study(*study, options.format);
-  if (!options.plot.empty()) draw(*study, options.plot);
+  show(*study, options);
   return end_of(*study);
 }
 
 // ------------------------------------------------------------------------------------------------ those there are
 
 struct OneStudyOptions {
-  std::string study, plot;
+  std::string study, plot, page;
   bool wait = false, with_jobs = false;
   Format format = Format::table;
 };
@@ -217,8 +223,7 @@ Exit get(const Program& program, const OneStudyOptions& options) {
   if (!study) return Exit::interrupted;
   if (options.format == Format::table)
     say("study " + study->id() + " is " + study_state_name(study->state()) + ": " + progress_of(*study));
-  print_study(*study, options.format);
-  if (!options.plot.empty()) draw(*study, options.plot);
+  show(*study, options);
   return options.wait ? end_of(*study) : Exit::ok;
 }
 
@@ -277,6 +282,8 @@ void add_study_verbs(CLI::App& app, Program& program) {
   study->add_option("--name", options->name, "of the study; the case's if absent");
   study->add_option("--data", options->data, "on a server of its own that keeps its jobs in this folder, as run does");
   study->add_option("--plot", options->plot, "picture of cost against difference")->type_name("FILE.png");
+  study->add_option("--page", options->page, "a page with tables and pictures, and the study as JSON, in this folder")
+      ->type_name("FOLDER");
   study->add_flag("--knobs", options->knobs, "list what has a short name");
   add_format(study, options->format);
   study->callback([&program, options, study] {
@@ -294,6 +301,8 @@ void add_study_verbs(CLI::App& app, Program& program) {
   const auto [get_verb, get_options] = one("get", "what its runs say so far", true, get);
   get_verb->add_flag("--wait", get_options->wait, "until it has ended");
   get_verb->add_option("--plot", get_options->plot, "picture of cost against difference")->type_name("FILE.png");
+  get_verb->add_option("--page", get_options->page, "a page with tables and pictures, and the study as JSON, in this folder")
+      ->type_name("FOLDER");
   add_format(get_verb, get_options->format);
   const auto [list_verb, list_options] = one("list", "the studies, newest first", false, list);
   add_format(list_verb, list_options->format);

@@ -129,6 +129,21 @@ std::string Table::for_people() const {
   return text;
 }
 
+std::string Table::markdown() const {
+  std::string text = "|", rule = "|";
+  for (const auto& column : columns_) {
+    text += " " + column + " |";
+    rule += "---|";
+  }
+  text += "\n" + rule + "\n";
+  for (const auto& row : rows_) {
+    text += "|";
+    for (const auto& cell : row) text += " " + plain(cell) + " |";
+    text += "\n";
+  }
+  return text;
+}
+
 std::string Table::text(Format format) const {
   if (format == Format::table) return for_people();
   if (format == Format::csv) return csv();

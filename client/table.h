@@ -24,6 +24,7 @@ class Table {
 
   // json: an array of objects; jsonl: an object a line; csv: RFC 4180 with a header.
   std::string text(Format format) const;
+  std::string markdown() const;
 
  private:
   std::string for_people() const;

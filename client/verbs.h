@@ -13,6 +13,7 @@
 namespace bedflow::client {
 
 struct Program {
+  std::string line;            // as it was typed
   ServerChoice server;         // what --server and --context say
   std::function<Exit()> verb;  // what was asked for
 };

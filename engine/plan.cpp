@@ -380,6 +380,7 @@ std::string Plan::text() const {
   line("memory", short_number(memory_bytes / 1e6) + " MB");
   line("checkpoint", short_number(checkpoint_bytes / 1e6) + " MB");
   line("estimated wall time", short_number(seconds) + " s");
+  if (!scene.fidelity.empty()) line("fidelity", scene.fidelity);
   for (const std::string& warning : warnings) out << "  warning: " << warning << "\n";
   return out.str();
 }

@@ -91,6 +91,7 @@ struct Scene {
   std::vector<MonitorSetup> monitors;
   std::optional<double> plot_interval;  // s
   GuardSetup guard;
+  std::string fidelity;  // where the case stands between speed and accuracy, for people
 };
 
 }  // namespace bedflow

@@ -12,6 +12,7 @@
 #include "case_parser.h"
 #include "case_rules.h"
 #include "case_walker.h"
+#include "fidelity.h"
 #include "mesh_file.h"
 #include "sphere_table.h"
 
@@ -37,6 +38,7 @@ CaseRead read_case_text(const std::string& text, const std::filesystem::path* fo
   CaseParse parse = is_json(text) ? parse_case_json(text) : parse_case_text(text);
   CaseRead result{std::move(parse.value), std::move(parse.faults)};
   if (parse.read_to_end) {
+    complete(result.value);
     if (folder != nullptr) {
       const bool spheres = inline_sphere_tables(result.value, *folder, result.faults);
       const bool meshes = inline_mesh_files(result.value, *folder, result.faults);

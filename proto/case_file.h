@@ -23,7 +23,8 @@ struct CaseRead {
 };
 
 // Text format or JSON (told by the first character that is not white space: '{' is JSON). Faults of the parser carry
-// line and column in their path ("line 12, column 3"); a case that parses is checked by check_case.
+// line and column in their path ("line 12, column 3"); a case that parses is completed by the profile that it names, and
+// checked by check_case.
 CaseRead read_case(const std::string& text);
 CaseRead read_case_file(const std::filesystem::path& path);  // a file that cannot be read is a fault too
 

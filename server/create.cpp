@@ -12,6 +12,7 @@
 
 #include "case_difference.h"
 #include "case_file.h"
+#include "fidelity.h"
 #include "jobs.h"
 #include "refusal.h"
 #include "security.h"
@@ -133,6 +134,7 @@ v1::CreateJobResponse Jobs::create(const Caller& caller, const v1::CreateJobRequ
   }
   if (!request.has_case_())
     throw Refusal(Refused::bad_request, "the request has neither a case nor start_from", "bedflow init mueller");
+  complete(*request.mutable_case_());
   require_sound(request, capacities());
   *record.job.mutable_spec() = request.spec();
   v1::CreateJobResponse response;

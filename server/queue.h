@@ -29,7 +29,9 @@ struct Use {
 
 // Whether a quota, say, keeps an owner's jobs from starting.
 using IsHeld = std::function<bool(const std::string& owner)>;
-inline bool nobody_is_held(const std::string&) { return false; }
+inline bool nobody_is_held(const std::string&) {
+  return false;
+}
 
 class Queue {
  public:
@@ -45,8 +47,7 @@ class Queue {
   // Jobs of an owner that is held are passed over.
   std::optional<std::string> next(const std::map<std::string, Use>& uses, const IsHeld& is_held = nobody_is_held) const;
   // What it waits for, for people: "2 of 4 slots (1 is free)". Empty: nothing, or it does not wait.
-  std::string reason(const std::string& id, const std::map<std::string, Use>& uses,
-                     const IsHeld& is_held = nobody_is_held) const;
+  std::string reason(const std::string& id, const std::map<std::string, Use>& uses, const IsHeld& is_held = nobody_is_held) const;
   std::vector<std::string> first(std::size_t most) const;
 
  private:

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <system_error>
 
+#include "fidelity.h"
 #include "refusal.h"
 #include "studies.h"
 
@@ -143,7 +144,9 @@ void Studies::submit(Kept& kept, int point) {
 
 // A job that has run the same case from the same packing to its end.
 std::optional<std::string> Studies::done_before(const v1::Case& value, std::uint32_t ranks, const std::string& packing_job) {
-  const std::string wanted = content_of(value);
+  v1::Case whole = value;
+  complete(whole);  // as a job keeps it
+  const std::string wanted = content_of(whole);
   v1::ListJobsRequest request;
   request.add_states(v1::SUCCEEDED);
   request.set_page_size(1000);

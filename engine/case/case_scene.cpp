@@ -9,6 +9,7 @@
 #include "case/vector.h"
 #include "case/wall_scene.h"
 #include "case_file.h"
+#include "fidelity.h"
 
 namespace bedflow {
 
@@ -317,7 +318,9 @@ Scene checked_scene(const CaseRead& read, const std::string& where) {
     for (const CaseFault& fault : read.faults) all += "\n  " + fault.path + ": " + fault.text;
     throw Stop(Reason::invalid_case, all);
   }
-  return make_scene(read.value);
+  Scene scene = make_scene(read.value);
+  scene.fidelity = standing_text(read.value);
+  return scene;
 }
 
 }  // namespace

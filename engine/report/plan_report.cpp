@@ -27,6 +27,7 @@ std::string plan_report(const Plan& plan) {
   report.set_checkpoint_bytes(plan.checkpoint_bytes);
   report.set_seconds(plan.seconds);
   report.set_steps(static_cast<std::uint64_t>(plan.steps));
+  if (!plan.scene.fidelity.empty()) report.set_fidelity(plan.scene.fidelity);
   for (const std::string& warning : plan.warnings) report.add_warnings(warning);
   report.set_text(plan.text());
   std::string text;

@@ -2,12 +2,20 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <google/protobuf/util/json_util.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
 #include <functional>
 #include <map>
+#include <sstream>
 
 #include "case_source.h"
 #include "failure.h"
 #include "reproduction.h"
+#include "study_follow.h"
+#include "study_page.h"
 #include "study_report.h"
 #include "vary.h"
 
@@ -23,6 +31,16 @@ std::string refusal(const std::function<void()>& call) {
     return std::string(failure.what()) + " | " + failure.next;
   }
   return "nothing was refused";
+}
+
+TEST(Vary, AProfileDecidesWhateverTheCaseSays) {
+  auto bed = load_case("mueller@mfix-exa-2018");
+  vary(bed, "fidelity", "fast");
+  const auto fast = load_case("mueller@bedflow", {"fidelity=FAST"});
+  EXPECT_EQ(bed.gas().SerializeAsString(), fast.gas().SerializeAsString());
+  EXPECT_EQ(bed.particles().steps_per_collision(), fast.particles().steps_per_collision());
+  EXPECT_TRUE(bed.particles().has_coulomb()) << "the law of friction is no matter of fidelity";
+  EXPECT_THAT(refusal([&] { vary(bed, "fidelity", "best"); }), HasSubstr("BEST"));
 }
 
 TEST(Vary, SetsMultipliesAndChooses) {
@@ -121,7 +139,7 @@ v1::Estimate estimate(double mean, double half_width) {
   return value;
 }
 
-TEST(StudyReport, TellsCostAndDifferenceAndDraws) {
+v1::Study study_of_three() {
   v1::Study study;
   study.set_id("s-000000000001");
   auto& spec = *study.mutable_spec();
@@ -142,13 +160,58 @@ TEST(StudyReport, TellsCostAndDifferenceAndDraws) {
     error.set_equal(i < 2);
     run.add_on_front(i > 0);
   }
-  const auto table = study_table(study);
+  return study;
+}
+
+TEST(StudyReport, TellsCostAndDifferenceAndDraws) {
+  const v1::Study study = study_of_three();
+  const auto table = study_table(study).text(Format::table);
   EXPECT_THAT(table, HasSubstr("0.5 % ± 2.5, equal"));
   EXPECT_THAT(table, HasSubstr("25 % ± 2.5"));
   EXPECT_THAT(table, HasSubstr("4 x"));
+  EXPECT_THAT(table, HasSubstr("substeps=4"));
   const auto script = study_plot(study, "study.png");
   EXPECT_THAT(script, HasSubstr("25 25 2.5 \"4\""));
   EXPECT_THAT(script, HasSubstr("on the front"));
+}
+
+TEST(StudyReport, ARunThatIsSuspendedHasNotEnded) {
+  v1::Study study = study_of_three();
+  EXPECT_EQ(progress_of(study), "3 of 3 runs have ended");
+  study.mutable_runs(1)->set_state(v1::STATE_SUSPENDED);
+  EXPECT_EQ(progress_of(study), "2 of 3 runs have ended; suspended, resume to go on: j-000000000001");
+  study.mutable_runs(1)->set_interval_met(true);
+  EXPECT_EQ(progress_of(study), "3 of 3 runs have ended");
+}
+
+TEST(StudyPage, KeepsTableSharesOfPhasesFailuresPictureAndJson) {
+  v1::Study study = study_of_three();
+  study.mutable_spec()->set_name("mueller: gas step");
+  study.mutable_spec()->set_command("bedflow study mueller");
+  for (const auto& [phase, seconds] : {std::pair("contacts", 30.0), {"pressure", 9.9}, {"balance", 0.1}}) {
+    auto& one = *study.mutable_runs(0)->mutable_cost()->add_phases();
+    one.set_phase(phase);
+    one.set_seconds(seconds);
+  }
+  study.mutable_runs(2)->set_state(v1::FAILED);
+  study.mutable_runs(2)->set_message("a contact overlaps");
+  std::string name = (std::filesystem::temp_directory_path() / "bedflow-page-XXXXXX").string();
+  const std::filesystem::path folder = mkdtemp(name.data());
+  const auto page = write_study_page(folder / "new", study);
+  EXPECT_EQ(page, folder / "new" / "mueller-gas-step.md");
+  std::stringstream text;
+  text << std::ifstream(page).rdbuf();
+  EXPECT_THAT(text.str(), HasSubstr("Made by `bedflow study mueller`, bedflow "));
+  EXPECT_THAT(text.str(), HasSubstr("| reference | SUCCEEDED | 100 | 1 x | 0.02000 ± 0.00040 | reference |"));
+  EXPECT_THAT(text.str(), HasSubstr("| run | contacts | pressure |\n|---|---|---|\n| reference | 75 | 24.8 |"));
+  EXPECT_THAT(text.str(), HasSubstr("substeps=4 failed: a contact overlaps"));
+  EXPECT_GT(std::filesystem::file_size(folder / "new" / "mueller-gas-step.png"), 1000);
+  v1::Study read;
+  std::stringstream json;
+  json << std::ifstream(folder / "new" / "mueller-gas-step.json").rdbuf();
+  ASSERT_TRUE(google::protobuf::util::JsonStringToMessage(json.str(), &read).ok());
+  EXPECT_EQ(read.SerializeAsString(), study.SerializeAsString());
+  std::filesystem::remove_all(folder);
 }
 
 }  // namespace
