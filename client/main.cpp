@@ -9,21 +9,9 @@ namespace bedflow::client {
 
 namespace {
 
-// Words with other than plain characters in quotes.
-std::string typed_line(int argc, char** argv) {
-  std::string line = "bedflow";
-  for (int i = 1; i < argc; ++i) {
-    const std::string word = argv[i];
-    const bool is_plain = word.find_first_of(" \t\n\"\\$`*?[]{}()<>|&;#~!") == word.npos && !word.empty();
-    line += " ";
-    line += is_plain ? word : "'" + word + "'";
-  }
-  return line;
-}
-
 int run(int argc, char** argv) {
   Program program;
-  program.line = typed_line(argc, argv);
+  program.words.assign(argv + 1, argv + argc);
   const auto line = command_line(program);
   CLI::App& app = *line;
   try {

@@ -107,6 +107,16 @@ Table long_form(const v1::Study& study) {
   return table;
 }
 
+// "20, 30, 50, 100": gnuplot's own are decades, and studies seldom span one.
+std::string log_tics(double low, double high) {
+  std::string text;
+  for (double decade = std::pow(10, std::floor(std::log10(low))); decade < high; decade *= 10) {
+    for (const int step : {1, 2, 3, 5, 7})
+      if (step * decade >= low && step * decade <= high) text += (text.empty() ? "" : ", ") + number_text(step * decade);
+  }
+  return text;
+}
+
 // One point of a line in the picture: cost, error and interval in per cent, and what to write beside it.
 std::string plot_row(const v1::Study& study, int point, int quantity) {
   const auto& run = study.runs(point);
@@ -203,7 +213,10 @@ std::string study_plot(const v1::Study& study, const std::filesystem::path& file
     dearest = std::max(dearest, run.cost().cpu_seconds());
   }
   text += "set key below center maxrows 1 Left reverse samplen 2 nobox\nset logscale x\n";
-  if (dearest > 0) text += "set xrange [" + number_text(0.8 * cheapest) + ":" + number_text(1.4 * dearest) + "]\n";
+  if (dearest > 0) {
+    text += "set xrange [" + number_text(0.8 * cheapest) + ":" + number_text(1.4 * dearest) + "]\n";
+    text += "set xtics (" + log_tics(0.8 * cheapest, 1.4 * dearest) + ")\n";
+  }
   std::set<std::string> lines;
   for (int i = 0; i < spec.points_size(); ++i) lines.insert(axes_of(spec, i));
   lines.erase("");
@@ -232,7 +245,7 @@ std::string study_plot(const v1::Study& study, const std::filesystem::path& file
       ++index;
     }
     text += "set title " + gnuplot_quoted(quantity_name(spec.quantities(q))) + " font \",15\"\n";
-    text += "set xlabel \"CPU seconds per simulated second\"\nset ylabel \"difference from the reference  /  %\"\n";
+    text += "set xlabel \"CPU seconds per simulated second\" offset 0,0.4\nset ylabel \"difference from the reference  /  %\"\n";
     if (!front.empty()) {
       text += "$front" + std::to_string(q) + " << EOD\n" + front + "EOD\n";
       draws += (draws.empty() ? "" : ", \\\n  ") + ("$front" + std::to_string(q)) +

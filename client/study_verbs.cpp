@@ -117,7 +117,23 @@ void require_sound(const v1::Case& value, const std::string& point) {
   throw Failure(Exit::usage, "the case of " + point + " has faults", "bedflow reference", std::move(faults));
 }
 
-v1::StudySpec spec_of(const StudyOptions& options, const std::string& line) {
+// As it was typed, for the page: without what says where, and not what.
+std::string command_of(const std::vector<std::string>& words) {
+  std::string line = "bedflow";
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    const std::string name = words[i].substr(0, words[i].find('='));
+    const bool says_where = name == "--data" || name == "--page" || name == "--plot" || name == "--server" || name == "--context";
+    if (says_where) {
+      i += name == words[i] ? 1 : 0;
+      continue;
+    }
+    const bool is_plain = !words[i].empty() && words[i].find_first_of(" \t\n\"'\\$`*?[]{}()<>|&;#~!") == std::string::npos;
+    line += is_plain ? " " + words[i] : " '" + words[i] + "'";
+  }
+  return line;
+}
+
+v1::StudySpec spec_of(const StudyOptions& options, const std::string& command) {
   if (options.vary.empty() || options.quantities.empty()) {
     throw Failure(
         Exit::usage,
@@ -128,7 +144,7 @@ v1::StudySpec spec_of(const StudyOptions& options, const std::string& line) {
   if (!base.case_().has_name()) base.mutable_case_()->set_name("study");
   v1::StudySpec spec;
   spec.set_name(options.name.empty() ? base.case_().name() : options.name);
-  spec.set_command(line);
+  spec.set_command(command);
   *spec.mutable_job() = base.spec();
   if (options.interval) spec.mutable_stop()->set_relative(*options.interval / 100);
   if (options.own_packings) spec.set_same_packing(false);
@@ -189,7 +205,7 @@ Exit begin(const Program& program, const StudyOptions& options) {
     throw Failure(Exit::usage, "a case is missing", "bedflow study mueller --vary substeps=1,5,20 --quantity bed_height --end 4");
   Interrupt interrupt;
   v1::CreateStudyRequest request;
-  *request.mutable_spec() = spec_of(options, program.line);
+  *request.mutable_spec() = spec_of(options, command_of(program.words));
   request.set_request_id(new_request_id());
   std::unique_ptr<EmbeddedServer> own;
   if (!options.data.empty()) own = std::make_unique<EmbeddedServer>(options.data);

@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "contexts.h"
 #include "failure.h"
@@ -13,9 +14,9 @@
 namespace bedflow::client {
 
 struct Program {
-  std::string line;            // as it was typed
-  ServerChoice server;         // what --server and --context say
-  std::function<Exit()> verb;  // what was asked for
+  std::vector<std::string> words;  // as they were typed
+  ServerChoice server;             // what --server and --context say
+  std::function<Exit()> verb;      // what was asked for
 };
 
 void add_case_verbs(CLI::App& app, Program& program);        // init, validate, reference, explain

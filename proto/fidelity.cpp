@@ -3,6 +3,7 @@
 #include <google/protobuf/text_format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 #include "case_difference.h"
@@ -53,13 +54,23 @@ void take_out(const Message& settings, Message& value) {
   });
 }
 
-// What the case would have otherwise if it left all to the profile.
-std::vector<CaseDifference> departures(const v1::Case& value, const Profile& profile) {
+// What the case has otherwise than if it left all to the profile.
+std::vector<CaseDifference> departures(v1::Case value, const Profile& profile) {
+  auto& time = *value.mutable_time();
+  if (value.has_particles() && !time.has_step() && !time.has_substeps()) {  // then the step is the collision time
+    const double steps = value.particles().steps_per_collision();
+    if (steps == std::round(steps)) time.set_substeps(static_cast<std::uint32_t>(steps));
+  }
   v1::Case pure = value;
   leave_open(pure);
   pure.set_fidelity(profile.fidelity);
   complete(pure);
   return differences(pure, value);
+}
+
+// "upwind {}" -> "upwind"
+std::string plain(const std::string& value) {
+  return value.ends_with(" {}") ? value.substr(0, value.size() - 3) : value;
 }
 
 }  // namespace
@@ -69,16 +80,16 @@ const std::vector<Profile>& profiles() {
       {v1::FAST,
        "particles { symplectic_euler {} steps_per_collision: 10 } time { substeps: 40 } gas { projection {} superbee {} } "
        "coupling { hat {} explicit {} displacement: true }",
-       ""},
+       "mueller 6.8 x, bed height -0.1 ± 1.8 %, against REFERENCE"},
       {v1::BALANCED,
        "particles { symplectic_euler {} steps_per_collision: 20 } time { substeps: 20 } gas { simple {} superbee {} } "
        "coupling { hat {} explicit {} displacement: true }",
-       ""},
+       "mueller 3.4 x, bed height -0.2 ± 1.9 %, against REFERENCE"},
       {v1::REFERENCE,
        "particles { velocity_verlet {} steps_per_collision: 50 } time { substeps: 10 } gas { simple { tolerance: 1e-4 } superbee "
        "{} } "
        "coupling { hat {} explicit {} displacement: true }",
-       ""},
+       "mueller 107 CPU s per simulated s"},
   };
   return all;
 }
@@ -111,7 +122,7 @@ std::string standing_text(const v1::Case& value) {
   const std::string name = v1::Fidelity_Name(nearest->fidelity);
   std::string text = value.has_fidelity() ? name : "none named; nearest to " + name;
   for (std::size_t i = 0; i < least.size(); ++i)
-    text += (i ? ", " : ", but ") + least[i].path + " " + least[i].second + " (" + least[i].first + ")";
+    text += (i ? ", " : ", but ") + least[i].path + " " + plain(least[i].second) + " (" + plain(least[i].first) + ")";
   return text + "; " + name + " as measured: " + nearest->measured;
 }
 

@@ -2,7 +2,16 @@
 #include "fidelity.h"
 
 #include <gmock/gmock.h>
+#include <google/protobuf/util/json_util.h>
 
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "bedflow/v1/study.pb.h"
 #include "case_file.h"
 #include "cases/ready_cases.h"
 
@@ -74,6 +83,36 @@ TEST(Fidelity, ExplainTellsWhereACaseStands) {
   EXPECT_THAT(standing_text(value), testing::StartsWith("BALANCED, but particles.steps_per_collision 16 (20); "));
   value.clear_fidelity();
   EXPECT_THAT(standing_text(value), HasSubstr("none named; nearest to BALANCED, but particles.steps_per_collision 16 (20)"));
+}
+
+// What is told of a profile is what the study that is kept has measured.
+TEST(Fidelity, SaysWhatWasMeasured) {
+  for (const std::string bed : {"mueller"}) {
+    const std::filesystem::path file =
+        std::filesystem::path(BEDFLOW_SOURCE_DIR) / "tests/validation/fidelity" / (bed + "-fidelity.json");
+    std::stringstream text;
+    text << std::ifstream(file).rdbuf();
+    v1::Study study;
+    ASSERT_TRUE(google::protobuf::util::JsonStringToMessage(text.str(), &study).ok()) << file;
+    const auto& reference = study.runs(static_cast<int>(study.spec().reference()));
+    for (int i = 0; i < study.runs_size(); ++i) {
+      const auto& name = study.spec().points(i).values(0);
+      const auto profile =
+          std::ranges::find_if(profiles(), [&](const auto& one) { return v1::Fidelity_Name(one.fidelity) == name; });
+      ASSERT_NE(profile, profiles().end()) << name;
+      std::array<char, 64> expected{};
+      if (profile->fidelity == v1::REFERENCE) {
+        std::snprintf(expected.data(), expected.size(), "%s %.0f CPU s", bed.c_str(), study.runs(i).cost().cpu_seconds());
+      } else {
+        const auto& height = study.runs(i).errors(0);
+        const double speed = reference.cost().cpu_seconds() / study.runs(i).cost().cpu_seconds();
+        const double percent = 100 / reference.quantities(0).mean();
+        std::snprintf(expected.data(), expected.size(), "%s %.1f x, bed height %+.1f ± %.1f %%", bed.c_str(), speed,
+                      percent * height.value(), percent * height.half_width());
+      }
+      EXPECT_THAT(profile->measured, HasSubstr(expected.data()));
+    }
+  }
 }
 
 }  // namespace
