@@ -87,7 +87,7 @@ TEST(Fidelity, ExplainTellsWhereACaseStands) {
 
 // What is told of a profile is what the study that is kept has measured.
 TEST(Fidelity, SaysWhatWasMeasured) {
-  for (const std::string bed : {"mueller"}) {
+  for (const std::string bed : {"mueller", "goldschmidt"}) {
     const std::filesystem::path file =
         std::filesystem::path(BEDFLOW_SOURCE_DIR) / "tests/validation/fidelity" / (bed + "-fidelity.json");
     std::stringstream text;
