@@ -18,8 +18,8 @@ void leave_open(v1::Case& value);
 
 struct Profile {
   v1::Fidelity fidelity;
-  const char* settings;  // a case with these alone, in text format
-  const char* measured;  // what it costs and errs, for people
+  v1::Case settings;     // these alone
+  const char* measured;  // what it costs and errs, for people; fidelity_test holds it against the study that is kept
 };
 const std::vector<Profile>& profiles();  // from the fastest on
 

@@ -18,17 +18,15 @@ class RowsInUse {
   // holds the faces too.
   void find(const Field& solids) {
     if (all_) return;
-    std::vector<char> any(rows());
-    for (std::size_t row = 0; row < any.size(); ++row) {
+    for (std::size_t row = 0; row < now_.size(); ++row) {
       const double* value = solids.data() + static_cast<std::ptrdiff_t>(row) * stride_;
       int found = 0;
       for (int i = 0; i < stride_; ++i) found |= value[i] != 0;
-      any[row] = found != 0;
+      now_[row] = found != 0;
     }
-    widen(any, 1, cells_[0]);
-    widen(any, cells_[0], cells_[1]);
-    now_ = any;
-    for (std::size_t row = 0; row < any.size(); ++row) lately_[row] |= now_[row];
+    widen(1, cells_[0]);
+    widen(cells_[0], cells_[1]);
+    for (std::size_t row = 0; row < now_.size(); ++row) lately_[row] |= now_[row];
   }
   // Where the particles are is not known.
   void take_all() { now_.assign(rows(), 1), lately_ = now_; }
@@ -41,12 +39,12 @@ class RowsInUse {
  private:
   std::size_t rows() const { return static_cast<std::size_t>(cells_[0]) * cells_[1]; }
   // By two in a direction of so many rows, `step` apart.
-  void widen(std::vector<char>& any, int step, int count) const {
-    const std::vector<char> before = any;
-    for (int row = 0; row < static_cast<int>(any.size()); ++row) {
+  void widen(int step, int count) {
+    narrow_ = now_;
+    for (int row = 0; row < static_cast<int>(now_.size()); ++row) {
       const int place = row / step % count;
       for (int shift = -2; shift <= 2; ++shift)
-        if (place + shift >= 0 && place + shift < count) any[row] |= before[row + shift * step];
+        if (place + shift >= 0 && place + shift < count) now_[row] |= narrow_[row + shift * step];
     }
   }
 
@@ -54,6 +52,7 @@ class RowsInUse {
   std::ptrdiff_t stride_;
   bool all_;
   std::vector<char> now_, lately_;  // 1 or 0
+  std::vector<char> narrow_;        // now_ before it is widened
 };
 
 }  // namespace bedflow

@@ -100,7 +100,7 @@ class Multigrid {
   std::vector<std::ptrdiff_t> order_;      // cells of the gathered level as the ranks send them
   std::vector<std::ptrdiff_t> coarsest_;   // cells of the last level
   std::vector<float> solution_, inverse_;  // of its matrix, symmetric: a row for each
-  std::vector<double> matrix_;
+  std::vector<double> matrix_, diagonal_, pivot_row_;
   std::vector<float> row_;
   std::vector<double> send_, receive_;
 };

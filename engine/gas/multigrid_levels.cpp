@@ -104,6 +104,8 @@ Multigrid::Multigrid(const Decomposition& decomposition, const Grid& grid) : dec
   solution_.resize(coarsest_.size());
   inverse_.resize(coarsest_.size() * coarsest_.size());
   matrix_.resize(inverse_.size());
+  diagonal_.resize(coarsest_.size());
+  pivot_row_.resize(coarsest_.size());
 }
 
 void Multigrid::add_level(const std::array<Edges, 3>& edges, Int3 place, bool whole) {
@@ -238,8 +240,8 @@ void Multigrid::coarsen(const Level& fine, Level& coarse) const {
   }
 }
 
-// Where an odd number of cells closes on itself, two of one colour meet: what they hold each other by counts twice, so that the
-// half sweep, which does not see that both move, cannot overshoot.
+// Of a cell's equation: the sum of its couplings. Where an odd number of cells closes on itself, two of one colour meet: what
+// they hold each other by counts twice, so that the half sweep, which does not see that both move, cannot overshoot.
 float Multigrid::diagonal_of(const Level& level, Int3 at) const {
   const std::ptrdiff_t c = level.index(at[0], at[1], at[2]);
   const Int3 first = level.first();
@@ -286,20 +288,19 @@ void Multigrid::invert_coarsest() {
       stride *= count;
     }
   }
-  std::vector<double> whole(n), pivot_row(n);
-  for (std::size_t m = 0; m < n; ++m) whole[m] = matrix_[m * n + m];
+  for (std::size_t m = 0; m < n; ++m) diagonal_[m] = matrix_[m * n + m];
   for (std::size_t m = 0; m < n; ++m) {
     double* row = matrix_.data() + m * n;
-    const double inverse = row[m] > 1e-12 * whole[m] ? 1 / row[m] : 0;  // round-off of some hundred operations
-    for (std::size_t i = 0; i < n; ++i) pivot_row[i] = inverse * row[i];
+    const double inverse = row[m] > 1e-12 * diagonal_[m] ? 1 / row[m] : 0;  // round-off of some hundred operations
+    for (std::size_t i = 0; i < n; ++i) pivot_row_[i] = inverse * row[i];
     for (std::size_t i = 0; i < n; ++i) {
       if (i == m) continue;
       double* other = matrix_.data() + i * n;
       const double factor = other[m];
-      for (std::size_t j = 0; j < n; ++j) other[j] -= factor * pivot_row[j];
+      for (std::size_t j = 0; j < n; ++j) other[j] -= factor * pivot_row_[j];
       other[m] = -factor * inverse;
     }
-    std::copy(pivot_row.begin(), pivot_row.end(), row);
+    std::copy(pivot_row_.begin(), pivot_row_.end(), row);
     row[m] = inverse;
   }
   for (std::size_t m = 0; m < n; ++m)

@@ -58,8 +58,8 @@ class Dem {
     double given = 0;   // work of the contacts on the particles since then, less that of walls that move, this rank, J
     double stored = 0;  // in springs at its opening, this rank (half of a pair across ranks), J
     double bound = 0;   // less the work that attraction could do, in the same contacts: below 0, J
-    double created =
-        0;  // by contacts while the account before was open: given + stored + bound at its end less those at its start
+    // By contacts while the account before was open, J: given + stored + bound at its end less those at its start.
+    double created = 0;
   };
   void open_energy_account() { opening_ = true; }
   const Energy& energy_account() const { return energy_; }

@@ -29,7 +29,7 @@ v1::Case with(v1::Case value, v1::Fidelity fidelity) {
   return value;
 }
 
-TEST(Fidelity, EveryReadyCaseRunsWithEveryProfile) {
+TEST(Fidelity, EveryReadyCaseIsSoundWithEveryProfile) {
   for (const auto& ready : ready_cases())
     for (const auto& profile : profiles())
       EXPECT_THAT(check_case(with(ready_case(ready.name), profile.fidelity)), IsEmpty())
