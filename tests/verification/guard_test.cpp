@@ -115,7 +115,8 @@ Scene pressed(double steps_per_collision, double limit) {
       lattice { count { x: 6 y: 6 z: 6 } } } time { end: 10 } )");
   PlacedSeeds spheres;
   for (int i = 0; i < 216; ++i) {
-    const Vec3 place{i % 6 + 0.5, i / 6 % 6 + 0.5, i / 36 + 0.5};
+    const int row = i / 6, layer = row / 6;
+    const Vec3 place{i % 6 + 0.5, row % 6 + 0.5, layer + 0.5};
     spheres.push_back({.position = 0.99 * 0.002 * place, .diameter = 0.002});
   }
   scene.particles->regions[0].seeds = spheres;
