@@ -78,7 +78,7 @@ std::filesystem::path write_study_page(const std::filesystem::path& folder, cons
   auto page = folder / (name + ".md");
   write_text(page, "# " + spec.name() + "\n\n" + made_by(spec.has_command() ? spec.command() : "bedflow study") +
                        "\nReference: " + reference_text(study) + ". Each other run differs from it as its line says." +
-                       (spec.same_packing() ? " All start from the same particles." : "") +
+                       (spec.same_packing() ? " All whose particles are alike start from the same ones." : "") +
                        " Behind a ± is half the 95 % interval, from the scatter of bins of time; a difference has that of both "
                        "runs, and is *equal* when it lies within. *CPU s/s* are CPU seconds of all ranks per simulated second, "
                        "and an asterisk marks those that no other run is both cheaper and closer than.\n\n" +

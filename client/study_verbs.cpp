@@ -293,7 +293,7 @@ void add_study_verbs(CLI::App& app, Program& program) {
   study->add_option("--interval", options->interval, "stop a run once all its half-widths are below so many % of the means")
       ->check(CLI::Range(0.0, 100.0));
   study->add_flag("--own-packings", options->own_packings,
-                  "every run seeds and settles its own bed; otherwise all start from one");
+                  "every run seeds and settles its own bed; otherwise all with the same particles start from one");
   study->add_flag("--anew", options->anew, "run again what an earlier job has run already");
   study->add_option("--name", options->name, "of the study; the case's if absent");
   study->add_option("--data", options->data, "on a server of its own that keeps its jobs in this folder, as run does");

@@ -41,6 +41,8 @@ constexpr std::array known_axes = {
     KnownAxis{"convection", "gas.convection", Finer::larger, "upwind, smart, superbee"},
     KnownAxis{"solver", "gas.solver", Finer::larger, "simple, projection"},
     KnownAxis{"displacement", "coupling.displacement", Finer::larger, "true, false: ∂ε/∂t in the gas"},
+    KnownAxis{"coarse_graining", "particles.coarse_graining.factor", Finer::smaller,
+              "diameter of parcels over that of particles"},
     KnownAxis{"fidelity", "fidelity", Finer::larger, "FAST, BALANCED, REFERENCE: a profile of all that profiles choose"},
     // what the field's codes call them
     KnownAxis{"coupling.substeps", "time.substeps", Finer::smaller, ""},

@@ -55,7 +55,7 @@ double drag_limit(const Scene& scene) {
   const double slip = fastest_inflow(*scene.gas) / fraction;
   double limit = 0;
   for (const SeedKind& kind : scene.particles->kinds) {
-    const double d = kind.sizes.smallest(), mass = kind.density * sphere_volume(d);
+    const double d = kind.sizes.smallest() / scene.particles->coarse_graining, mass = kind.density * sphere_volume(d);
     const DragScene drag{scene.gas->setup.density, scene.gas->setup.viscosity, d};
     const double b = std::visit([&](const auto& law) { return law(drag, slip, fraction); }, scene.coupling->drag);
     if (b > 0) limit = limit > 0 ? std::min(limit, 2 * mass / b) : 2 * mass / b;
@@ -216,9 +216,17 @@ std::string sizes_text(const ParticleScene& particles) {
   return (smallest < particles.largest() ? short_number(smallest) + " to " : "") + short_number(particles.largest()) + " m";
 }
 
+std::string parcels_text(const ParticleScene& particles) {
+  const double l = particles.coarse_graining;
+  if (l == 1) return "each particle by itself";
+  return "each stands for " + short_number(l * l * l) + " of d = " + short_number(particles.largest() / l) +
+         " m, which feel the gas";
+}
+
 void add_sizes(Plan& plan) {
   const ParticleScene& particles = *plan.scene.particles;
   const auto add = [&](const char* part, bool on, const std::string& why) { plan.items.push_back({part, on, why}); };
+  add("parcels of particles", particles.coarse_graining > 1, parcels_text(particles));
   const auto types = particles.kinds.size();
   const bool distributed =
       std::any_of(particles.types.begin(), particles.types.end(), [](const ParticleType& type) { return type.distributed; });

@@ -44,7 +44,8 @@ struct ParticleScene {
   double steps_per_collision = 0;  // dt_DEM = τ/steps
   double skin = 0;                 // m; 0: chosen by the plan
   ContactLaws laws;
-  bool verlet = false;  // velocity Verlet, else symplectic Euler
+  bool verlet = false;         // velocity Verlet, else symplectic Euler
+  double coarse_graining = 1;  // all above is of parcels, so many times as wide as the particles of the case
 
   double largest() const {  // diameter, m
     double largest = 0;

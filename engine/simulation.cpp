@@ -47,6 +47,7 @@ Simulation::CouplingPart::CouplingPart(const Decomposition& decomposition, const
                 .gravity = plan.scene.gravity,
                 .fraction_floor = plan.scene.coupling->fraction_floor,
                 .scheme = plan.scene.coupling->scheme,
+                .coarse_graining = plan.scene.particles->coarse_graining,
                 .types = plan.scene.particles->types,
                 .panels = plan.scene.gas->setup.panels},
                timer),
@@ -112,7 +113,9 @@ void Simulation::deposit_volume() {
 }
 
 void Simulation::find_drag() {
-  const DragScene scene{plan_.scene.gas->setup.density, plan_.scene.gas->setup.viscosity, plan_.scene.particles->largest()};
+  const ParticleScene& particles = *plan_.scene.particles;
+  const DragScene scene{plan_.scene.gas->setup.density, plan_.scene.gas->setup.viscosity,
+                        particles.largest() / particles.coarse_graining};
   std::visit([&](const auto& law) { coupling_->transfer.find_drag(law, scene, dem_->particles(), gas_->state); },
              plan_.scene.coupling->drag);
 }

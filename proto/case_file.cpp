@@ -12,8 +12,10 @@
 #include "case_parser.h"
 #include "case_rules.h"
 #include "case_walker.h"
+#include "coarse_graining.h"
 #include "fidelity.h"
 #include "mesh_file.h"
+#include "parameter_text.h"
 #include "sphere_table.h"
 
 namespace bedflow {
@@ -26,6 +28,17 @@ void shorten(std::vector<CaseFault>& faults) {
   const std::size_t more = faults.size() - most_faults;
   faults.resize(most_faults);
   faults.push_back({"case", "has " + std::to_string(more) + " more faults: correct these first"});
+}
+
+void check_rules(const v1::Case& value, std::vector<CaseFault>& faults) {
+  check_scene(value, faults);
+  check_faces(value, faults);
+  check_flow(value, faults);
+  check_particles(value, faults);
+  check_contacts(value, faults);
+  check_seeding(value, faults);
+  check_walls(value, faults);
+  check_monitors(value, faults);
 }
 
 bool is_json(const std::string& text) {
@@ -71,14 +84,15 @@ CaseRead read_case_file(const std::filesystem::path& path) {
 
 std::vector<CaseFault> check_case(const v1::Case& value) {
   std::vector<CaseFault> faults = walk_case(value);
-  check_scene(value, faults);
-  check_faces(value, faults);
-  check_flow(value, faults);
-  check_particles(value, faults);
-  check_contacts(value, faults);
-  check_seeding(value, faults);
-  check_walls(value, faults);
-  check_monitors(value, faults);
+  check_rules(value, faults);
+  check_coarse_graining(value, faults);
+  if (faults.empty() && value.particles().has_coarse_graining()) {
+    check_rules(parcels_of(value), faults);
+    const std::string why =
+        "; these are parcels, particles.coarse_graining.factor = " + number_text(value.particles().coarse_graining().factor()) +
+        " times as wide as the particles";
+    for (auto& fault : faults) fault.text += why;
+  }
   shorten(faults);
   return faults;
 }

@@ -12,15 +12,16 @@ namespace bedflow {
 
 using CaseFaults = std::vector<CaseFault>;
 
-void check_scene(const v1::Case& value, CaseFaults& faults);      // what must be there together; time; grid and kernel
-void check_faces(const v1::Case& value, CaseFaults& faults);      // periodic directions, walls, patches, balance of flows
-void check_flow(const v1::Case& value, CaseFaults& faults);       // driven directions, panels
-void check_particles(const v1::Case& value, CaseFaults& faults);  // types and sizes, contacts' reach
-void check_contacts(const v1::Case& value, CaseFaults& faults);   // laws that go together, pairs of types
-void check_seeding(const v1::Case& value, CaseFaults& faults);    // where they are at time 0
-void check_particles(const v1::Case& value, CaseFaults& faults);  // where they are at time 0, contacts' reach
-void check_walls(const v1::Case& value, CaseFaults& faults);      // shapes, motions and meshes of walls within the box
-void check_monitors(const v1::Case& value, CaseFaults& faults);   // monitors and the references that belong to them
+void check_scene(const v1::Case& value, CaseFaults& faults);            // what must be there together; time; grid and kernel
+void check_faces(const v1::Case& value, CaseFaults& faults);            // periodic directions, walls, patches, balance of flows
+void check_flow(const v1::Case& value, CaseFaults& faults);             // driven directions, panels
+void check_particles(const v1::Case& value, CaseFaults& faults);        // types and sizes, contacts' reach
+void check_contacts(const v1::Case& value, CaseFaults& faults);         // laws that go together, pairs of types
+void check_seeding(const v1::Case& value, CaseFaults& faults);          // where they are at time 0
+void check_particles(const v1::Case& value, CaseFaults& faults);        // where they are at time 0, contacts' reach
+void check_coarse_graining(const v1::Case& value, CaseFaults& faults);  // what can be joined into parcels
+void check_walls(const v1::Case& value, CaseFaults& faults);            // shapes, motions and meshes of walls within the box
+void check_monitors(const v1::Case& value, CaseFaults& faults);         // monitors and the references that belong to them
 
 constexpr std::array<const char*, 3> axis_names{"x", "y", "z"};
 

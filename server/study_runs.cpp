@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <system_error>
 
+#include "coarse_graining.h"
 #include "fidelity.h"
 #include "refusal.h"
 #include "studies.h"
@@ -36,6 +37,27 @@ std::optional<v1::StudyCost> cost_of(const std::filesystem::path& summary) {
     added.set_seconds(phase.value("seconds", 0.0) / simulated);
   }
   return cost;
+}
+
+// What decides where particles lie at time 0: cases that have it in common can begin with the same ones.
+std::string packing_content(const v1::Case& value) {
+  const v1::Case computed = parcels_of(value);
+  v1::Case kept;
+  *kept.mutable_domain()->mutable_size() = computed.domain().size();
+  *kept.mutable_walls() = computed.walls();
+  auto& particles = *kept.mutable_particles();
+  particles = computed.particles();
+  particles.clear_density();
+  particles.clear_contact();
+  particles.clear_tangential();
+  particles.clear_rolling();
+  particles.clear_cohesion();
+  particles.clear_pairs();
+  particles.clear_integrator();
+  particles.clear_steps_per_collision();
+  particles.clear_skin();
+  particles.clear_coarse_graining();
+  return content_of(kept);
 }
 
 // In whose name its runs are made and stopped.
@@ -135,8 +157,9 @@ bool Studies::pack(Kept& kept) {
 void Studies::submit(Kept& kept, int point) {
   const v1::StudySpec& spec = kept.spec;
   v1::StudyRun& run = *kept.study.mutable_runs(point);
-  const v1::Case& value = spec.points(point).case_();
-  const std::string packing = spec.same_packing() && value.has_particles() ? kept.study.packing_job() : "";
+  const v1::Case &value = spec.points(point).case_(), &reference = spec.points(static_cast<int>(spec.reference())).case_();
+  const bool is_shared = spec.same_packing() && value.has_particles() && packing_content(value) == packing_content(reference);
+  const std::string packing = is_shared ? kept.study.packing_job() : "";
   const auto earlier = spec.reuse() ? done_before(value, spec.job().ranks(), packing) : std::nullopt;
   if (earlier) run.set_reused(true);
   run.set_job(earlier ? *earlier : create_job(kept.study, "run-" + std::to_string(point), value, packing));

@@ -9,6 +9,7 @@
 #include "case/vector.h"
 #include "case/wall_scene.h"
 #include "case_file.h"
+#include "coarse_graining.h"
 #include "fidelity.h"
 
 namespace bedflow {
@@ -155,6 +156,7 @@ ParticleScene particle_scene(const v1::Case& from) {
   scene.steps_per_collision = particles.steps_per_collision();
   scene.skin = particles.skin();
   scene.verlet = particles.has_velocity_verlet();
+  if (particles.has_coarse_graining()) scene.coarse_graining = particles.coarse_graining().factor();
   return scene;
 }
 
@@ -235,7 +237,8 @@ Statistic statistic(const v1::Case& scene, const v1::Monitor& from) {
     case v1::Monitor::kMaxOverlap:
       return MaxOverlap{};
     case v1::Monitor::kParticleCount:
-      return ParticleCount{type_index(particles, from.particle_count().type())};
+      return ParticleCount{type_index(particles, from.particle_count().type()),
+                           particles.has_coarse_graining() ? std::pow(particles.coarse_graining().factor(), 3) : 1};
     case v1::Monitor::kParticleMass:
       return ParticleMass{type_index(particles, from.particle_mass().type())};
     case v1::Monitor::kMassEntered:
@@ -318,7 +321,7 @@ Scene checked_scene(const CaseRead& read, const std::string& where) {
     for (const CaseFault& fault : read.faults) all += "\n  " + fault.path + ": " + fault.text;
     throw Stop(Reason::invalid_case, all);
   }
-  Scene scene = make_scene(read.value);
+  Scene scene = make_scene(parcels_of(read.value));
   scene.fidelity = standing_text(read.value);
   return scene;
 }

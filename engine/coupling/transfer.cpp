@@ -187,14 +187,15 @@ void Transfer::find_drag(const Drag& drag, const DragScene& scene, const Particl
   drag_.resize(particles.owned);
   const double *slip = slip_.data(), *fraction = fraction_.data();
   double* b = drag_.data();
+  const double parcel = setup_.coarse_graining, number = parcel * parcel * parcel;
   if (sizes_.step == 0) {
 #pragma GCC ivdep
-    for (std::size_t p = 0; p < particles.owned; ++p) b[p] = drag(scene, slip[p], fraction[p]);
+    for (std::size_t p = 0; p < particles.owned; ++p) b[p] = number * drag(scene, slip[p], fraction[p]);
   } else {
     const double* diameter = sizes_.diameter.data();
 #pragma GCC ivdep
     for (std::size_t p = 0; p < particles.owned; ++p)
-      b[p] = drag(DragScene{scene.density, scene.viscosity, diameter[p]}, slip[p], fraction[p]);
+      b[p] = number * drag(DragScene{scene.density, scene.viscosity, diameter[p] / parcel}, slip[p], fraction[p]);
   }
 }
 

@@ -39,6 +39,7 @@ struct TransferSetup {
   Vec3 gravity{};                // m/s²
   double fraction_floor = 0.35;  // of ε
   ExchangeScheme scheme{};
+  double coarse_graining = 1;  // diameter of what is computed over that of the particles that it stands for, which feel the drag
   std::vector<ParticleType> types = {};  // where there are several types or sizes: volumes and masses are then each's own
   std::vector<Panel> panels = {};        // inside the box; not with a Gaussian, which would spread through them
 };
@@ -75,7 +76,8 @@ class Transfer {
   // Where the particles are, for what follows; deposit_volume has done it.
   void locate(const ParticleStore& particles);
 
-  // b of every particle from U and ε at its place.
+  // b of every particle from U and ε at its place. The diameter in `scene` is that of the particles that feel it, where all are
+  // alike; a parcel feels as much as all that it stands for.
   template <class Drag>
   void find_drag(const Drag& drag, const DragScene& scene, const ParticleStore& particles, const GasState& gas);
 

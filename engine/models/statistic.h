@@ -78,9 +78,10 @@ struct ParticleCount {
   static constexpr const char* unit = "1";
   static constexpr const char* meaning = "number of particles";
   static constexpr Subject subject = Subject::particles;
-  int type = -1;  // -1: of all
+  int type = -1;      // -1: of all
+  double parcel = 1;  // particles that each computed one stands for
   void add(const StatisticScene&, const ParticleValues& p, std::span<double> sums) const {
-    if (type < 0 || p.type == type) sums[0] += 1;
+    if (type < 0 || p.type == type) sums[0] += parcel;
   }
 };
 

@@ -98,7 +98,8 @@ TEST(Vary, EveryKnobTurns) {
                                                        {"kernel", "square_dpvm"},  {"exchange", "semi_implicit"},
                                                        {"convection", "superbee"}, {"solver", "projection"},
                                                        {"displacement", "false"},  {"gas_step", "3e-5"},
-                                                       {"substeps", "7"},          {"fidelity", "fast"}};
+                                                       {"substeps", "7"},          {"fidelity", "fast"},
+                                                       {"coarse_graining", "1.5"}};
   for (const auto& knob : knobs()) {
     auto bed = load_case("mueller");
     const auto before = bed.SerializeAsString();

@@ -3,6 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <map>
 #include <set>
 
 #include "case_file.h"
@@ -110,6 +113,39 @@ TEST_F(RealStudy, SurvivesTheServerAndRunsNothingTwice) {
   EXPECT_TRUE(second.runs(1).reused());
   EXPECT_FALSE(second.runs(2).reused());
   EXPECT_EQ(jobs().size(), 5u);
+}
+
+// The reference's particles are no start for others: fewer, wider, or elsewhere.
+TEST_F(RealStudy, RunsWithOtherParticlesSeedTheirOwn) {
+  auto asked = request({20, 20, 20, 10}, 0.004);
+  auto& points = *asked.mutable_spec()->mutable_points();
+  auto& fewer = *points[1].mutable_case_()->mutable_particles();
+  const auto count = fewer.random().count();
+  fewer.mutable_random()->set_count(count / 2);
+  points[2].mutable_case_()->mutable_particles()->mutable_coarse_graining()->set_factor(1.25);
+  for (auto& point : points) {
+    auto& monitor = *point.mutable_case_()->add_monitors();
+    monitor.set_name("count");
+    monitor.mutable_particle_count();
+    monitor.set_interval(0);
+  }
+  const auto study = wait_for_end(create(asked).id());
+  ASSERT_EQ(study.state(), v1::STUDY_DONE) << study.message();
+  const auto counted = [&](int run) {
+    const auto own = statistics(study.runs(run).job());
+    const auto found = std::ranges::find(own.series(), "count", &v1::Series::name);
+    return found == own.series().end() ? -1 : found->value(0);
+  };
+  EXPECT_EQ(counted(0), count);
+  EXPECT_EQ(counted(1), count / 2);
+  EXPECT_NEAR(counted(2), count, 0.5 * std::pow(1.25, 3));  // whole parcels
+  EXPECT_EQ(counted(3), count);
+  std::map<std::string, std::string> packed_by;
+  for (const auto& job : jobs()) packed_by[job.id()] = job.start_from_job();
+  EXPECT_EQ(packed_by[study.runs(0).job()], study.packing_job());
+  EXPECT_EQ(packed_by[study.runs(1).job()], "");
+  EXPECT_EQ(packed_by[study.runs(2).job()], "");
+  EXPECT_EQ(packed_by[study.runs(3).job()], study.packing_job());
 }
 
 TEST_F(RealStudy, StopsARunWhoseIntervalIsNarrowEnough) {

@@ -1,7 +1,9 @@
 // The exchange between gas and particles over whole steps: closed to round-off, right whatever the step.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <numbers>
+#include <utility>
 
 #include "support/scene.h"
 
@@ -140,36 +142,66 @@ TEST(Exchange, ClosesWithThoseThatHaveLeft) {
 // Uniform settling in a closed box, the gas displaced upwards: V = v_t ε^n with n = 4.65 where Re is small (Richardson & Zaki
 // 1954, Trans. Inst. Chem. Eng. 32, 35). Wen & Yu's law holds that exponent: 2.65, 1 for the superficial velocity and 1 for the
 // buoyancy of the mixture. Particles of 10 µm: m/b is a tenth of the step and less.
-TEST(HinderedSettling, FollowsRichardsonZaki) {
-  const Comm world = Comm::world();
-  const double diameter = 10e-6, terminal = (1500 - 1.2) * 9.81 * diameter * diameter / 18 / 1.8e-5;
-  for (const auto& [solids, expected] : {std::pair{0.1, 0.61267}, {0.2, 0.35430}, {0.3, 0.19042}, {0.4, 0.09298}}) {
-    const double cell = diameter * std::cbrt(8 * std::numbers::pi / 6 / solids);  // two particles in each direction
+struct Settling {
+  static constexpr double diameter = 10e-6, terminal = (1500 - 1.2) * 9.81 * diameter * diameter / 18 / 1.8e-5;
+  static constexpr std::array<std::pair<double, double>, 4> ratios = {
+      {{0.1, 0.61267}, {0.2, 0.35430}, {0.3, 0.19042}, {0.4, 0.09298}}};  // solids fraction and V/v_t
+
+  double cell;  // m; two particles in each direction
+  std::string text;
+  explicit Settling(double solids, const std::string& more = "") : cell(diameter * std::cbrt(8 * std::numbers::pi / 6 / solids)) {
     const auto length = [&](int cells) { return std::to_string(1e6 * cells * cell) + "e-6"; };
     const std::string size = "x: " + length(4) + " y: " + length(16) + " z: " + length(4);
-    const std::string text = "name: \"settling\" domain { size { " + size + R"( } cells { x: 4 y: 16 z: 4 }
+    text = "name: \"settling\" domain { size { " + size + R"( } cells { x: 4 y: 16 z: 4 }
         periodic { x: true z: true } faces { y_low { free_slip_wall {} } y_high { free_slip_wall {} } } }
       gravity { y: -9.81 }
       gas { density: 1.2 viscosity: 1.8e-5 simple { tolerance: 1e-5 max_iterations: 3000 } upwind {} }
       particles { diameter: 10e-6 density: 1500 linear_spring_dashpot { stiffness: 4e-6 restitution: 0.9 } frictionless {}
-        symplectic_euler {} lattice { count { x: 8 y: 32 z: 8 } region { low {} high { )" +
-                             size + R"( } } } }
-      coupling { wen_yu {} hat {} semi_implicit {} } time { end: 1 step: 5e-4 })";
-    EXPECT_THROW(make_plan(scene_of(world, with(text, "semi_implicit", "explicit")), world.size()), Stop);
+        symplectic_euler {} lattice { count { x: 8 y: 32 z: 8 } } )" +
+           more + "} coupling { wen_yu {} hat {} semi_implicit {} } time { end: 1 step: 5e-4 }";
+  }
+
+  // Mean velocity downwards after eight steps, far from floor and surface, over the terminal velocity of one particle.
+  double ratio() const {
+    const Comm world = Comm::world();
     PhaseTimer timer;
     Simulation box(make_plan(scene_of(world, text), world.size()), world, timer);
     box.seed();
     for (int s = 0; s < 8; ++s) box.step();
-    ASSERT_FALSE(box.failure()) << box.failure().message;
+    EXPECT_FALSE(box.failure()) << box.failure().message;
     const ParticleStore& store = box.particles()->particles();
     double sum = 0, count = 0;
     for (std::size_t p = 0; p < store.owned; ++p) {
-      if (std::abs(store.position(p).y - 8 * cell) > 3 * cell) continue;  // far from floor and surface
+      if (std::abs(store.position(p).y - 8 * cell) > 3 * cell) continue;
       sum -= store.velocity(p).y;
       ++count;
     }
-    const double ratio = world.sum(sum) / world.sum(count) / terminal;
-    EXPECT_NEAR(ratio / expected, 1, 0.01) << solids;  // Re of 3e-3 makes 0.3 % of it
+    return world.sum(sum) / world.sum(count) / terminal;
+  }
+};
+
+TEST(HinderedSettling, FollowsRichardsonZaki) {
+  const Comm world = Comm::world();
+  for (const auto& [solids, expected] : Settling::ratios) {
+    const Settling box(solids);
+    EXPECT_THROW(make_plan(scene_of(world, with(box.text, "semi_implicit", "explicit")), world.size()), Stop);
+    EXPECT_NEAR(box.ratio() / expected, 1, 0.01) << solids;  // Re of 3e-3 makes 0.3 % of it
+  }
+}
+
+// Parcels of eight fall as their particles; by themselves, twice as wide, they would fall four times as fast.
+TEST(HinderedSettling, OfParcelsIsThatOfTheirParticles) {
+  const Comm world = Comm::world();
+  for (const auto& [solids, expected] : Settling::ratios) {
+    const Settling box(solids, "coarse_graining { factor: 2 } ");
+    if (solids == 0.4) {  // cells of 1.1 parcels
+      EXPECT_THROW(scene_of(world, with(box.text, "factor: 2", "factor: 4")), Stop) << "parcels wider than cells";
+    }
+    const Plan parcels = make_plan(scene_of(world, box.text), world.size());
+    const Plan particles = make_plan(scene_of(world, Settling(solids).text), world.size());
+    EXPECT_EQ(8 * parcels.particle_count, particles.particle_count);
+    EXPECT_NEAR(parcels.drag_limit / particles.drag_limit, 1, 1e-13);  // 2m/b of both
+    EXPECT_NEAR(box.ratio() / expected, 1, 0.01) << solids;
   }
 }
 
