@@ -9,9 +9,15 @@ shift
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 export PATH=$PWD/build/release/bin:$PATH
 
-knobs() {
+mueller() {
   bedflow study mueller@bedflow --name "mueller: $1" --end 3 --from 0.75 --bin 0.225 --data "$data" --page tests/validation/knobs \
     --quantity bed_height --quantity bed_height:fluctuation --quantity bed_pressure_drop:fluctuation --quantity velocity_25 "${@:2}"
+}
+# The inflow reaches its end value after a quarter of a second, not after one.
+goldschmidt() {
+  bedflow study goldschmidt-1.5@bedflow --name "goldschmidt: $1" --set domain.faces.y_low.inflow.ramp.duration=0.25 \
+    --end 2 --from 0.5 --bin 0.15 --data "$data" --page tests/validation/knobs \
+    --quantity bed_height --quantity bed_height:fluctuation --quantity bed_pressure_drop --quantity bed_pressure_drop:fluctuation "${@:2}"
 }
 
 for what in "$@"; do
@@ -24,7 +30,7 @@ for what in "$@"; do
         --out tests/validation/goldschmidt
       ;;
     knobs)
-      knobs "knobs" \
+      mueller "knobs" \
         --vary steps_per_collision=8,12,20,50 --reference steps_per_collision=20 \
         --vary stiffness=x0.01,x0.1,x1,x10 --reference stiffness=x1 \
         --vary tangential=frictionless,coulomb,spring --reference tangential=spring \
@@ -36,7 +42,22 @@ for what in "$@"; do
         --vary solver=simple,projection --reference solver=simple \
         --vary cells=x0.67,x1,x1.4 --reference cells=x1 \
         --vary displacement=true,false --reference displacement=true || true  # one run fails, as the page tells
-      knobs "gas step" --vary substeps=1,5,10,20,40,100,200 --reference substeps=5
+      mueller "gas step" --vary substeps=1,5,10,20,40,100,200 --reference substeps=5
+      mueller "parcels" --vary coarse_graining=1,1.25,1.5,2 --reference coarse_graining=1
+      goldschmidt "parcels" --vary coarse_graining=1,1.25,1.5,2 --reference coarse_graining=1
+      goldschmidt "knobs" \
+        --vary steps_per_collision=10,20,40 --reference steps_per_collision=20 \
+        --vary stiffness=x0.1,x1 --reference stiffness=x1 \
+        --vary tangential=frictionless,coulomb,spring --reference tangential=spring \
+        --vary integrator=symplectic_euler,velocity_verlet --reference integrator=symplectic_euler \
+        --vary exchange=explicit,semi_implicit --reference exchange=explicit \
+        --vary convection=upwind,superbee --reference convection=superbee \
+        --vary solver=simple,projection --reference solver=simple \
+        --vary cells=x0.67,x1,x1.4 --reference cells=x1 \
+        --vary displacement=true,false --reference displacement=true \
+        --vary substeps=10,20,40,100 --reference substeps=20 \
+        --vary kernel=hat,square_dpvm,gaussian --reference kernel=hat \
+        --vary tolerance=x1,x10 --reference tolerance=x1
       ;;
     fidelity)
       bedflow study mueller --name "mueller: fidelity" --vary fidelity=FAST,BALANCED,REFERENCE --reference fidelity=REFERENCE \
