@@ -77,13 +77,14 @@ Simulation::Simulation(const Plan& plan, const Comm& comm, PhaseTimer& timer, Cu
 // ------------------------------------------------------------------------------------------------ one step
 
 void Simulation::step() {
-  if (coupling_) deposit_volume();  // particles -> ε, ∂ε/∂t
-  if (coupling_) find_drag();       // U, ε -> b
+  look_for_particles();            // coupled_
+  if (coupled_) deposit_volume();  // particles -> ε, ∂ε/∂t
+  if (coupled_) find_drag();       // U, ε -> b
   if (gas_) note(controller_.hold(step_limit(), time_));
   double dt = controller_.next(time_);
-  if (coupling_) deposit_drag(dt);                                            // b and bV -> faces
-  if (gas_) dt = advance_gas(dt);                                             // U, p
-  if (coupling_) coupling_->transfer.sample(gas_->state, dem_->particles());  // U, ∇p -> F_g
+  if (coupled_) deposit_drag(dt);                                            // b and bV -> faces
+  if (gas_) dt = advance_gas(dt);                                            // U, p
+  if (coupled_) coupling_->transfer.sample(gas_->state, dem_->particles());  // U, ∇p -> F_g
   if (audit_due(dt)) audit_exchange();
   if (dem_) advance_particles(dt);  // contacts, walls, motion, in sub-steps
   time_ = controller_.end(time_, dt);
@@ -99,6 +100,14 @@ void Simulation::watch(double dt) {
   if (gas_) watch_gas(limits, gas_->grid, gas_->state.velocity, dt, failure_);
   if (dem_) energy_.look(*dem_, decomposition_.comm(), failure_);
   if (dem_) watch_particles(limits, *dem_, max_overlap_, dt / last_substeps_, failure_);
+}
+
+// As long as there are particles, and for two steps after: the first takes them out of ε and of the exchange, the second out of
+// ∂ε/∂t. Then nothing of either changes any more until one enters.
+void Simulation::look_for_particles() {
+  if (!coupling_) return;
+  coupled_ = particle_count_ > 0 || steps_alone_ < 2;
+  steps_alone_ = particle_count_ > 0 ? 0 : std::min(steps_alone_ + 1, 2);
 }
 
 void Simulation::deposit_volume() {
@@ -148,12 +157,12 @@ StepLimit Simulation::step_limit() const {
 
 // Takes the longest step up to dt that converges; returns it.
 double Simulation::advance_gas(double dt) {
-  const Exchange* exchange = coupling_ ? &coupling_->exchange : nullptr;
+  const Exchange* exchange = coupled_ ? &coupling_->exchange : nullptr;
   for (;;) {
     gas_outcome_ = gas_->solver.advance(gas_->state, exchange, time_, dt);
     if (gas_outcome_.converged) break;
     note(controller_.cut(dt, time_, gas_outcome_.reason));
-    if (coupling_) deposit_drag(dt);  // what the gas is to lose depends on the step
+    if (coupled_) deposit_drag(dt);  // what the gas is to lose depends on the step
   }
   note(controller_.converged());
   return dt;
@@ -184,7 +193,7 @@ void Simulation::audit_exchange() {
 void Simulation::advance_particles(double dt) {
   const int substeps = substeps_in(dt);
   energy_.prepare(*dem_);
-  if (coupling_ && std::visit([](const auto& scheme) { return scheme.anew; }, plan_.scene.coupling->scheme)) {
+  if (coupled_ && std::visit([](const auto& scheme) { return scheme.anew; }, plan_.scene.coupling->scheme)) {
     for (int substep = 0; substep < substeps; ++substep) {
       pull_anew();
       dem_->advance(1, dt / substeps, time_ + substep * (dt / substeps));

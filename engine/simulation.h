@@ -89,6 +89,7 @@ class Simulation {
     CouplingPart(const Decomposition& decomposition, const Plan& plan, GasPart& gas, PhaseTimer& timer);
   };
 
+  void look_for_particles();
   void deposit_volume();
   void find_drag();
   void deposit_drag(double dt);
@@ -126,6 +127,8 @@ class Simulation {
   std::unique_ptr<CouplingPart> coupling_;
 
   std::uint64_t steps_ = 0;
+  bool coupled_ = false;  // in the present step there is something to pass between gas and particles
+  int steps_alone_ = 0;   // since particles were last there, up to 2
   int last_substeps_ = 0;
   StepController controller_;
   double time_ = 0, last_step_ = 0, settled_time_ = 0;

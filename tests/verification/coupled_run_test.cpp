@@ -249,6 +249,64 @@ TEST(Scene, OfGasAloneAndOfParticlesAloneRun) {
   EXPECT_EQ(dem.particle_count(), 500);
 }
 
+// A scene that couples but has no particles is that of the gas alone in the same blocks, to the bit.
+TEST(Scene, OfABedWithoutParticlesIsThatOfItsGas) {
+  const Comm world = Comm::world();
+  const std::string box = R"(name: "none" domain { size { x: 0.02 y: 0.04 z: 0.02 } cells { x: 5 y: 10 z: 5 }
+    faces { y_low { inflow { velocity: 1 ramp { duration: 0.02 } } } y_high { outflow {} } } } gravity { y: -9.81 }
+    gas { density: 1.2 viscosity: 1.8e-5 simple {} smart {} } time { end: 1 step: 1e-3 } )";
+  const std::string none = R"(particles { diameter: 0.002 density: 1000 linear_spring_dashpot { stiffness: 1000 restitution: 0.5 }
+    frictionless {} symplectic_euler {} random { count: 0 seed: 1 } } coupling { gidaspow_blended {} hat {} explicit {} })";
+  PhaseTimer timer;
+  Simulation coupled(make_plan(scene_of(world, box + none), world.size()), world, timer);
+  Simulation alone(make_plan(scene_of(world, box), world.size()), world, timer, coupled.decomposition().cuts());
+  for (Simulation* simulation : {&alone, &coupled}) {
+    simulation->seed();
+    run(*simulation, 10);
+  }
+  const Simulation::GasPlot a = alone.gas_plot(), b = coupled.gas_plot();
+  EXPECT_TRUE(a.pressure == b.pressure);  // too much to print
+  EXPECT_TRUE(a.velocity == b.velocity);
+  EXPECT_TRUE(a.fraction == b.fraction);
+}
+
+// The engine leaves the exchange out two steps after the last particle has left; a resume passes nothing twice more. Both come to
+// the same bits, and the next particle is felt.
+TEST(Scene, ThatTheLastParticleHasLeftIsThatOfItsGasUntilOneEnters) {
+  const Comm world = Comm::world();
+  const std::string text = R"(name: "one" domain { size { x: 0.02 y: 0.03 z: 0.02 } cells { x: 5 y: 8 z: 5 }
+    faces { y_low { inflow { velocity: 0.5 } } y_high { outflow { particles: LEAVE } }
+      x_low { no_slip_wall {} particle_inflows { number_rate: 100 velocity { x: 0.5 y: 1 } from: 0.03 } } } } gravity { y: -9.81 }
+    gas { density: 1.2 viscosity: 1.8e-5 simple {} smart {} }
+    particles { diameter: 0.002 density: 1000 linear_spring_dashpot { stiffness: 1000 restitution: 0.5 } frictionless {} symplectic_euler {}
+      placed { spheres { position { x: 0.01 y: 0.024 z: 0.01 } velocity { y: 1 } } } }
+    coupling { gidaspow_blended {} hat {} semi_implicit {} } time { end: 1 step: 1e-3 })";
+  const Plan plan = make_plan(scene_of(world, text), world.size());
+  PhaseTimer timer;
+  Simulation through(plan, world, timer);
+  through.seed();
+  run(through, 1);
+  const auto lowest = [&] {
+    double least = 1;
+    for (const double fraction : through.gas_plot().fraction) least = std::min(least, fraction);
+    return -world.max(-least);
+  };
+  EXPECT_LT(lowest(), 1);
+  while (through.particle_count() > 0 && through.time() < 0.02) run(through, 1);
+  ASSERT_EQ(through.particle_count(), 0);
+  run(through, 1);
+  EXPECT_EQ(lowest(), 1);
+  run(through, 4);
+  const auto resumed = moved(through, plan, world, timer, through.decomposition().cuts());
+  while (through.time() < 0.05) {
+    run(through, 1);
+    run(*resumed, 1);
+    ASSERT_TRUE(state_of(*resumed) == state_of(through)) << through.time();
+  }
+  EXPECT_GT(through.particle_count(), 0);
+  EXPECT_LT(lowest(), 1);
+}
+
 TEST(Scene, ACheckpointOfAnotherSceneIsRefusedByField) {
   const Comm world = Comm::world();
   const TestFolder folder(world);
