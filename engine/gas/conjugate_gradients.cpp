@@ -12,7 +12,7 @@ constexpr int most_iterations = 2000;
 }  // namespace
 
 ConjugateGradients::ConjugateGradients(const Decomposition& decomposition, const Grid& grid, Halo& halo,
-                                       Preconditioner preconditioner, Workspace& work)
+                                       Preconditioner preconditioner, Workspace& work, int upright)
     : decomposition_(decomposition),
       grid_(grid),
       halo_(halo),
@@ -21,7 +21,7 @@ ConjugateGradients::ConjugateGradients(const Decomposition& decomposition, const
       direction_(work[1]),
       product_(work[2]),
       row_sum_(grid) {
-  if (preconditioner == Preconditioner::multigrid) preconditioner_.emplace<Multigrid>(decomposition, grid);
+  if (preconditioner == Preconditioner::multigrid) preconditioner_.emplace<Multigrid>(decomposition, grid, upright);
   if (preconditioner == Preconditioner::incomplete_cholesky) preconditioner_.emplace<IncompleteCholesky>(grid);
 }
 

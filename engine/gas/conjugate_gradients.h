@@ -23,8 +23,9 @@ constexpr const char* name(Preconditioner preconditioner) {  // as in the schema
 
 class ConjugateGradients {
  public:
+  // upright: of the multigrid.
   ConjugateGradients(const Decomposition& decomposition, const Grid& grid, Halo& halo, Preconditioner preconditioner,
-                     Workspace& work);
+                     Workspace& work, int upright = -1);
 
   // What the preconditioner needs of a new matrix. Collective.
   void factor(const SevenPoint& matrix);

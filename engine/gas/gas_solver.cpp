@@ -15,6 +15,14 @@ GasSetup unrelaxed(GasSetup setup) {
   return setup;
 }
 
+// The direction of gravity, or the nearest; -1: there is none.
+int upright(Vec3 gravity) {
+  int direction = -1;
+  for (int d = 0; d < 3; ++d)
+    if (std::abs(gravity[d]) > (direction < 0 ? 0 : std::abs(gravity[direction]))) direction = d;
+  return direction;
+}
+
 }  // namespace
 
 // ------------------------------------------------------------------------------------------------ what both ways share
@@ -29,7 +37,7 @@ GasStep::GasStep(const Decomposition& given_decomposition, const Grid& given_gri
       boundaries(decomposition, grid, setup.faces),
       panels(grid, decomposition, boundaries, setup.panels),
       work(grid),
-      pressure(decomposition, grid, halo, boundaries, setup.preconditioner, work),
+      pressure(decomposition, grid, halo, boundaries, setup.preconditioner, work, upright(setup.gravity)),
       momentum(decomposition, grid, halo, setup, boundaries, panels, work, pressure.mobility()),
       driven(decomposition, grid, setup),
       old_velocity(grid),

@@ -13,21 +13,18 @@ constexpr int stretch = 1024;  // of a layer, swept at once: new values and what
 
 void Multigrid::apply(const Field& r, double magnitude, Field& z) {
   Level& finest = levels_[0];
-  const Int3 n = finest.cells;
   const double down = magnitude > 0 ? 1 / magnitude : 1, up = scale_ / down;
-  for (int k = 0; k < n[2]; ++k)
-    for (int j = 0; j < n[1]; ++j) {
-      const double* from = r.data() + grid_.index(0, j, k);
-      float* to = finest.b.data() + finest.index(0, j, k);
-      for (int i = 0; i < n[0]; ++i) to[i] = static_cast<float>(down * from[i]);
-    }
+  for_finest(finest.cells, [&](std::ptrdiff_t at, std::ptrdiff_t step, std::ptrdiff_t here, int n) {
+    const double* from = r.data() + at;
+    float* to = finest.b.data() + here;
+    for (int i = 0; i < n; ++i) to[i] = static_cast<float>(down * from[i * step]);
+  });
   cycle(0);
-  for (int k = 0; k < n[2]; ++k)
-    for (int j = 0; j < n[1]; ++j) {
-      const float* from = finest.x.data() + finest.index(0, j, k);
-      double* to = z.data() + grid_.index(0, j, k);
-      for (int i = 0; i < n[0]; ++i) to[i] = up * static_cast<double>(from[i]);
-    }
+  for_finest(finest.cells, [&](std::ptrdiff_t at, std::ptrdiff_t step, std::ptrdiff_t here, int n) {
+    const float* from = finest.x.data() + here;
+    double* to = z.data() + at;
+    for (int i = 0; i < n; ++i) to[i * step] = up * static_cast<double>(from[i]);
+  });
 }
 
 // x = M⁻¹ b on level l.

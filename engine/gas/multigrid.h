@@ -8,11 +8,11 @@
 //   coupling of a coarse face: the sum over its faces × distance of the fine centres / distance of the coarse ones
 //
 // which is Galerkin's operator of constant interpolation, with the over-correction of smooth errors taken out (Braess 1995): it
-// couples six cells again, and whatever the coefficients jump by, no error is corrected by more than the distances' ratio. Cells
-// that are narrow along y or z are not joined in it but smoothed by lines (multigrid_lines.cpp), unless these are cut by
-// ranks or close on themselves. Where they are, a barrier inside a pair counts too, in series, to a third at the least: a
-// bubble's thin roof still stands on the coarse levels. Smoothing is Gauss–Seidel in red and black, over-relaxed (Yavneh 1996),
-// in reverse order after the coarse correction, and more of it on coarser levels, which cost little. M is symmetric and positive
+// couples six cells again, and whatever the coefficients jump by, no error is corrected by more than the distances' ratio. Flat
+// or long cells are not joined in a narrow direction but smoothed by lines (multigrid_lines.cpp), unless these are cut by ranks
+// or close on themselves. Where they are, a barrier inside a pair counts too, in series, to a third at the least: a bubble's thin
+// roof still stands on the coarse levels. Smoothing is Gauss–Seidel in red and black, over-relaxed (Yavneh 1996), in reverse
+// order after the coarse correction, and more of it on coarser levels, which cost little. M is symmetric and positive
 // (semi)definite, on any number of ranks. In single precision: M need not be exact, and half the bytes are half the time.
 #pragma once
 
@@ -26,7 +26,8 @@ namespace bedflow {
 
 class Multigrid {
  public:
-  Multigrid(const Decomposition& decomposition, const Grid& grid);
+  // upright: the direction across which the barriers lie, that of gravity; -1: none is known.
+  Multigrid(const Decomposition& decomposition, const Grid& grid, int upright);
 
   // The coefficients of all levels. Collective.
   void factor(const SevenPoint& matrix);
@@ -37,6 +38,8 @@ class Multigrid {
   std::size_t bytes() const;
 
  private:
+  static constexpr int widest_register = 16;  // lines beside each other fill it; where they do not, joining costs less
+
   using Edges = std::vector<std::vector<float>>;  // along a direction: of the cells of each block, in edges of the finest cells
   struct Level {
     Int3 cells{}, global{};  // of this rank and of the box; the same once gathered
@@ -71,7 +74,8 @@ class Multigrid {
 
   void add_level(const std::array<Edges, 3>& edges, Int3 place, bool whole);
   bool choose_joined(Level& level, bool whole) const;
-  int narrow_direction(const Level& level, bool whole) const;
+  void choose_axes(bool whole);
+  int line_direction(const Int3& cells, bool whole, int first) const;
   void measure(const Level& fine, Level& coarse) const;
   void coarsen(const Level& fine, Level& coarse) const;
   float diagonal_of(const Level& level, Int3 at) const;
@@ -92,8 +96,21 @@ class Multigrid {
   void restrict_residual(Level& fine, Level& coarse);
   void prolong(const Level& coarse, Level& fine);
 
+  double size(int d) const { return decomposition_.size()[axis_[d]]; }
+  bool periodic(int d) const { return decomposition_.periodic(axis_[d]); }
+  // row(c, step, l, n): n cells from low corner on along the levels' first direction, the first of which is entry c of a field,
+  // `step` apart, and l of the finest level; cells 0 … high−1 of that level.
+  template <class Row>
+  void for_finest(const Int3& high, Row row) const {
+    const std::ptrdiff_t s[3] = {grid_.stride(axis_[0]), grid_.stride(axis_[1]), grid_.stride(axis_[2])};
+    for (int k = 0; k < high[2]; ++k)
+      for (int j = 0; j < high[1]; ++j) row(grid_.index(0, 0, 0) + j * s[1] + k * s[2], s[0], levels_[0].index(0, j, k), high[0]);
+  }
+
   const Decomposition& decomposition_;
   const Grid& grid_;
+  int upright_;
+  Int3 axis_{0, 1, 2};  // of the box, by the direction of a level
   std::vector<Level> levels_;
   std::size_t gathered_ = 0;               // the first level that is gathered; 0: none is
   double scale_ = 1;                       // of the couplings in single precision

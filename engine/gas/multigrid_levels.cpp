@@ -15,7 +15,6 @@ constexpr std::int64_t most_solved = 100;  // cells of which the inverse matrix 
 constexpr std::int64_t inversion_per_cell =
     70;                            // as long as the inversion takes at most so many operations a cell of the finest grid
 constexpr double longest = 1.5;    // edge over the narrowest one at which cells are still joined in its direction
-constexpr double flat = 2;         // the other edges over the narrowest one, from which on its lines are smoothed as a whole
 constexpr double half_sweeps = 3;  // on the finest level
 constexpr double growth = 0.5;     // half sweeps grow with this power of the ratio of cells, and
 constexpr double most_half_sweeps = 16;
@@ -65,13 +64,17 @@ Int3 Multigrid::Level::end(Int3 low) const {
   return result;
 }
 
-Multigrid::Multigrid(const Decomposition& decomposition, const Grid& grid) : decomposition_(decomposition), grid_(grid) {
-  std::array<Edges, 3> edges;
-  for (int d = 0; d < 3; ++d)
-    for (int p = 0; p < decomposition.ranks()[d]; ++p)
-      edges[d].emplace_back(static_cast<std::size_t>(decomposition.cells(d, p)), 1.0f);
-  Int3 place = decomposition.place();
+Multigrid::Multigrid(const Decomposition& decomposition, const Grid& grid, int upright)
+    : decomposition_(decomposition), grid_(grid), upright_(upright) {
   bool whole = decomposition.comm().size() == 1;
+  choose_axes(whole);
+  std::array<Edges, 3> edges;
+  Int3 place;
+  for (int d = 0; d < 3; ++d) {
+    for (int p = 0; p < decomposition.ranks()[axis_[d]]; ++p)
+      edges[d].emplace_back(static_cast<std::size_t>(decomposition.cells(axis_[d], p)), 1.0f);
+    place[d] = decomposition.place()[axis_[d]];
+  }
   for (;;) {
     add_level(edges, place, whole);
     Level& level = levels_.back();
@@ -117,11 +120,11 @@ void Multigrid::add_level(const std::array<Edges, 3>& edges, Int3 place, bool wh
     level.cells[d] = static_cast<int>(edges[d][place[d]].size());
     level.global[d] = static_cast<int>(chained(edges[d]).size());
     for (int side = 0; side < 2; ++side) {
-      level.neighbour[d][side] = !whole                       ? decomposition_.neighbour(d, side)
-                                 : decomposition_.periodic(d) ? decomposition_.comm().rank()
-                                                              : -1;
+      level.neighbour[d][side] = !whole        ? decomposition_.neighbour(axis_[d], side)
+                                 : periodic(d) ? decomposition_.comm().rank()
+                                               : -1;
     }
-    finer *= static_cast<double>(grid_.global[d]) / level.global[d];
+    finer *= static_cast<double>(grid_.global[axis_[d]]) / level.global[d];
   }
   const Int3 first = level.first();
   level.parity = (first[0] + first[1] + first[2]) & 1;
@@ -131,32 +134,13 @@ void Multigrid::add_level(const std::array<Edges, 3>& edges, Int3 place, bool wh
     field->assign(size, 0);
 }
 
-// In which all lines lie within this rank's block, and cells are flat; -1: there is none. Not along x, nor in a narrow box: lines
-// beside each other fill the registers, and joining costs less where they do not.
-int Multigrid::narrow_direction(const Level& level, bool whole) const {
-  constexpr int widest_register = 16;
-  if (grid_.global[0] < widest_register) return -1;
-  for (int d = 1; d < 3; ++d) {
-    if (level.global[d] == 1 || decomposition_.periodic(d) || !(whole || decomposition_.ranks()[d] == 1)) continue;
-    const double edge = decomposition_.size()[d] / level.global[d];
-    bool narrow = true, others = false;
-    for (int t = 0; t < 3; ++t) {
-      if (t == d || level.global[t] == 1) continue;
-      others = true;
-      narrow = narrow && decomposition_.size()[t] / level.global[t] >= flat * edge;
-    }
-    if (narrow && others) return d;
-  }
-  return -1;
-}
-
 // False: a block is down to one cell in a direction in which cells should be joined.
 bool Multigrid::choose_joined(Level& level, bool whole) const {
-  level.lines = narrow_direction(level, whole);
+  level.lines = grid_.global[axis_[0]] < widest_register ? -1 : line_direction(level.global, whole, 1);
   double narrowest = std::numeric_limits<double>::infinity();
   Vec3 edge;
   for (int d = 0; d < 3; ++d) {
-    edge[d] = decomposition_.size()[d] / level.global[d];
+    edge[d] = size(d) / level.global[d];
     if (level.global[d] > 1 && d != level.lines) narrowest = std::min(narrowest, edge[d]);
   }
   bool possible = true;
@@ -182,15 +166,14 @@ void Multigrid::factor(const SevenPoint& matrix) {
   largest = decomposition_.comm().max(largest);
   scale_ = largest > 0 ? 1 / largest : 1;
   for (int d = 0; d < 3; ++d) {
-    const double scale = finest.global[d] == 1 && decomposition_.periodic(d) ? 0 : scale_;  // a cell beside itself
-    Int3 high = grid_.cells;
+    const double scale = finest.global[d] == 1 && periodic(d) ? 0 : scale_;  // a cell beside itself
+    Int3 high = finest.cells;
     ++high[d];
-    for (int k = 0; k < high[2]; ++k)
-      for (int j = 0; j < high[1]; ++j) {
-        const double* from = matrix.coupling[d].data() + grid_.index(0, j, k);
-        float* to = finest.coupling[d].data() + finest.index(0, j, k);
-        for (int i = 0; i < high[0]; ++i) to[i] = static_cast<float>(scale * from[i]);
-      }
+    for_finest(high, [&](std::ptrdiff_t at, std::ptrdiff_t step, std::ptrdiff_t here, int n) {
+      const double* from = matrix.coupling[axis_[d]].data() + at;
+      float* to = finest.coupling[d].data() + here;
+      for (int i = 0; i < n; ++i) to[i] = static_cast<float>(scale * from[i * step]);
+    });
   }
   for (std::size_t l = 1; l < levels_.size(); ++l) {
     invert(levels_[l - 1]);
@@ -213,7 +196,7 @@ void Multigrid::measure(const Level& fine, Level& coarse) const {
 
 void Multigrid::coarsen(const Level& fine, Level& coarse) const {
   for (int d = 0; d < 3; ++d) {
-    if (coarse.global[d] == 1 && decomposition_.periodic(d)) continue;  // a cell beside itself
+    if (coarse.global[d] == 1 && periodic(d)) continue;  // a cell beside itself
     const int t1 = (d + 1) % 3, t2 = (d + 2) % 3;
     const bool alone = fine.lines < 0 && fine.joined[d] == 2 && fine.joined[t1] == 1 && fine.joined[t2] == 1;
     Int3 high = coarse.cells, at{};
@@ -248,7 +231,7 @@ float Multigrid::diagonal_of(const Level& level, Int3 at) const {
   float sum = 0;
   for (int d = 0; d < 3; ++d) {
     const float low = level.coupling[d][c], high = level.coupling[d][c + level.stride(d)];
-    const bool closes = decomposition_.periodic(d) && level.global[d] % 2 == 1;
+    const bool closes = periodic(d) && level.global[d] % 2 == 1;
     const int cell = first[d] + at[d];
     sum += (closes && cell == 0 ? 2 : 1) * low + (closes && cell == level.global[d] - 1 ? 2 : 1) * high;
   }
@@ -282,7 +265,7 @@ void Multigrid::invert_coarsest() {
         const double coupling = static_cast<double>(level.coupling[d][face]);
         const bool last = at == (side == 0 ? 0 : count - 1);
         row[m] += coupling;
-        if (last && decomposition_.periodic(d)) row[side == 0 ? m + (count - 1) * stride : m - (count - 1) * stride] -= coupling;
+        if (last && periodic(d)) row[side == 0 ? m + (count - 1) * stride : m - (count - 1) * stride] -= coupling;
         if (!last) row[side == 0 ? m - stride : m + stride] -= coupling;
       }
       stride *= count;
@@ -330,7 +313,8 @@ void Multigrid::set_order() {
   block.edges = levels_[gathered_ - 1].edges;
   const Int3 ranks = decomposition_.ranks();
   for (int rank = 0; rank < decomposition_.comm().size(); ++rank) {
-    block.place = {rank % ranks[0], rank / ranks[0] % ranks[1], rank / (ranks[0] * ranks[1])};
+    const Int3 place{rank % ranks[0], rank / ranks[0] % ranks[1], rank / (ranks[0] * ranks[1])};
+    for (int d = 0; d < 3; ++d) block.place[d] = place[axis_[d]];
     const Int3 low = block.first();
     Int3 high;
     for (int d = 0; d < 3; ++d) high[d] = low[d] + static_cast<int>(block.edges[d][block.place[d]].size());

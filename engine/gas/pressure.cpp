@@ -5,14 +5,14 @@
 namespace bedflow {
 
 PressureCorrection::PressureCorrection(const Decomposition& decomposition, const Grid& grid, Halo& halo,
-                                       const Boundaries& boundaries, Preconditioner preconditioner, Workspace& work)
+                                       const Boundaries& boundaries, Preconditioner preconditioner, Workspace& work, int upright)
     : decomposition_(decomposition),
       grid_(grid),
       halo_(halo),
       boundaries_(boundaries),
       open_(boundaries.open()),
       matrix_(grid),
-      solver_(decomposition, grid, halo, preconditioner, work),
+      solver_(decomposition, grid, halo, preconditioner, work, upright),
       correction_(work[3]),
       residual_(work[4]),
       row_sum_(grid) {}

@@ -13,8 +13,9 @@ namespace bedflow {
 
 class PressureCorrection {
  public:
+  // upright: of the multigrid.
   PressureCorrection(const Decomposition& decomposition, const Grid& grid, Halo& halo, const Boundaries& boundaries,
-                     Preconditioner preconditioner, Workspace& work);
+                     Preconditioner preconditioner, Workspace& work, int upright = -1);
 
   // What a pressure difference over a face does to its velocity, m/s/Pa; 0 where none is solved. To be set before assemble, which
   // makes the equation of it and leaves ε A D in its place.

@@ -2,6 +2,8 @@
 // PFMG (where it is installed: Debian's libhypre-dev), to the same residual: 1e-6 of the right side, root mean square. A table of
 // iterations and µs of CPU time a cell, what the preconditioner needs beforehand included. One core.
 //
+// And of the multigrid alone, whether its iterations are as many on any grid, for cells of all shapes.
+//
 // usage: bench_pressure [TEXT]     only the systems with TEXT in their name
 #include <cstdio>
 #include <ctime>
@@ -33,7 +35,7 @@ double cpu_seconds() {
 
 Outcome ours(const PressureSystem::Kind& kind, Preconditioner preconditioner) {
   PressureSystem system(kind);
-  ConjugateGradients solver(system.decomposition, system.grid, system.halo, preconditioner, system.work);
+  ConjugateGradients solver(system.decomposition, system.grid, system.halo, preconditioner, system.work, kind.up);
   Field x(system.grid);
   const double start = cpu_seconds();
   solver.factor(system.matrix);
@@ -218,6 +220,26 @@ void table(const std::string& wanted) {
   }
 }
 
+// Wide in one direction, flat in one, and of three different edges.
+void shapes(const std::string& wanted) {
+  constexpr int sizes[] = {16, 32, 64, 128};
+  std::printf("\niterations and us a cell, multigrid           16^3           32^3           64^3          128^3\n");
+  for (const Vec3 edge : {Vec3{8, 1, 1}, {1, 8, 1}, {1, 1, 8}, {1, 8, 8}, {8, 1, 8}, {8, 8, 1}, {8, 4, 1}, {4, 1, 8}, {1, 4, 8}})
+    for (const double drag : {0.0, 1.0, 1e3, 1e6}) {
+      char name[64];
+      std::snprintf(name, sizeof name, "cells %g:%g:%g, drag %g", edge.x, edge.y, edge.z, drag);
+      if (std::string(name).find(wanted) == std::string::npos) continue;
+      std::printf("%-34s", name);
+      for (const int n : sizes) {
+        const double cells = static_cast<double>(n) * n * n;
+        std::printf(" %s",
+                    cell(ours({.cells = {n, n, n}, .edge = edge, .drag = drag}, Preconditioner::multigrid), cells).c_str());
+        std::fflush(stdout);
+      }
+      std::printf("\n");
+    }
+}
+
 }  // namespace
 }  // namespace bedflow
 
@@ -228,5 +250,7 @@ int main(int argc, char** argv) {
   MPI_Initialized(&started);
   if (!started) MPI_Init(&argc, &argv);  // the session ends it
 #endif
-  bedflow::table(argc > 1 ? argv[1] : "");
+  const std::string wanted = argc > 1 ? argv[1] : "";
+  bedflow::table(wanted);
+  bedflow::shapes(wanted);
 }

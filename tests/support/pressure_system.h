@@ -17,6 +17,7 @@ struct PressureSystem {
     bool open = true;  // x = 0 above
     bool bed = true;   // else clear gas everywhere
     double drag = 0;   // of the bed, over inertia
+    int up = 1;        // direction
   };
 
   explicit PressureSystem(const Kind& given, const Comm& comm = Comm::self())
@@ -57,7 +58,7 @@ struct PressureSystem {
     });
     return decomposition.comm().sum(sum);
   }
-  bool singular() const { return !kind.open || kind.periodic[1]; }
+  bool singular() const { return !kind.open || kind.periodic[kind.up]; }
 
   Kind kind;
   Decomposition decomposition;
@@ -71,7 +72,8 @@ struct PressureSystem {
  private:
   double solids(Int3 cell) const {  // 0 … 0.6
     if (!kind.bed) return 0;
-    const double x = (cell[0] + 0.5) / kind.cells[0] - 0.5, y = (cell[1] + 0.5) / kind.cells[1];
+    const int beside = kind.up == 0 ? 1 : 0;  // across the bubble, which is as long as the box in the third direction
+    const double x = (cell[beside] + 0.5) / kind.cells[beside] - 0.5, y = (cell[kind.up] + 0.5) / kind.cells[kind.up];
     const bool bubble = x * x + (y - 0.25) * (y - 0.25) < 0.02;
     return y > 0.47 || bubble ? 0 : 0.6;
   }
@@ -82,7 +84,7 @@ struct PressureSystem {
     Int3 below = above;
     --below[d];
     const bool edge = !kind.periodic[d] && (above[d] == 0 || above[d] == kind.cells[d]);
-    if (edge && !(kind.open && d == 1 && above[d] == kind.cells[d])) return 0;
+    if (edge && !(kind.open && d == kind.up && above[d] == kind.cells[d])) return 0;
     const double s = edge ? solids(below) : 0.5 * (solids(below) + solids(above));
     return (edge ? 2 : 1) * grid.face_area(d) / grid.spacing[d] * (1 - s) / (1 + kind.drag * s / 0.6);
   }
