@@ -96,7 +96,7 @@ void draw_values(const std::filesystem::path& file, const std::vector<const Repr
     for (const auto& reference : references_of(runs.front()->scene, monitor, fluctuation))
       put(theirs, reference.points(0).value(), reference.points(0).half_width(), reference.source());
     const std::string name = fluctuation ? "fluctuation" : "mean";
-    const std::string labels = " using 1:($2+0.28):4 with labels font \",9\" tc rgb \"#444444\" notitle";
+    const std::string labels = " using (0):($2+0.3):4 with labels left offset 0.6,0 font \",9\" tc rgb \"#444444\" notitle";
     script += "$ours << EOD\n" + ours + "EOD\n$theirs << EOD\n" + (theirs.empty() ? "NaN NaN NaN \"\"\n" : theirs) + "EOD\n";
     script +=
         "set title " + gnuplot_quoted(monitor + ", " + name) + "\nunset ytics\nset yrange [" + std::to_string(-at) + ":0.8]\n";

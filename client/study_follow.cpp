@@ -50,6 +50,7 @@ std::optional<v1::Study> follow_study(const Connection& connection, const std::s
     }
     if (study && study->state() != v1::STUDY_RUNNING) {
       if (terminal.interactive()) std::fputs("\r\x1b[K", stderr);
+      if (!last.empty()) say(progress_of(*study));  // a log that tells of the way tells of the end
       return study;
     }
     const auto now = std::chrono::steady_clock::now();
