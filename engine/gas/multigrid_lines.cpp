@@ -18,7 +18,7 @@ namespace {
 
 // The other edges over one edge, from which on lines along that are smoothed as a whole: along an upright one, and along others,
 // where there is less to be gained.
-constexpr double flat = 2, very_flat = 4;
+constexpr double flat = 2, very_flat = 6;
 // Or an upright edge is about the narrowest, and another so many times as long.
 constexpr double about = 1.5, elongated = 4;
 
