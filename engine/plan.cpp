@@ -9,27 +9,12 @@
 
 #include "base/short_number.h"
 #include "coupling/transfer.h"
+#include "plan_cost.h"
 #include "plan_walls.h"
 
 namespace bedflow {
 
 namespace {
-
-// Measured on one core (deploy/bench.sh dem, transfer and gas print them anew); they make the estimate of the wall time and the
-// balance between ranks.
-constexpr double particle_substep_seconds = 9e-9;  // motion, walls
-constexpr double pair_substep_seconds = 4.4e-9;    // a listed pair, about every second touches: found, swept, listed
-constexpr double history_factor = 2;               // of a pair
-constexpr double resting_pairs = 3.7;              // listed, a particle
-constexpr double fluidized_pairs = 1.05;
-constexpr double particle_step_seconds = 0.036e-6;  // to the grid and back
-constexpr double cell_step_seconds = 0.125e-6;      // two outer iterations of SIMPLE
-constexpr double projection_cell_seconds = 0.13e-6;
-constexpr double start_seconds = 0.2;   // of the process
-constexpr double process_bytes = 27e6;  // with MPI and HDF5, before it holds anything
-constexpr double copies = 1.9;          // of what it holds, while a list is rebuilt or a checkpoint written
-constexpr double contact_bytes = 64;    // in a checkpoint
-constexpr double fluidized_contacts = 0.5, resting_contacts = 2.5;  // a particle, with history
 
 constexpr double widest_skin =
     0.8;  // of a cell: half of it a particle may be outside its block, where the halo must know the gas
@@ -160,35 +145,6 @@ void plan_space(Plan& plan) {
 void plan_pressure(Plan& plan) {
   if (!plan.scene.gas) return;
   plan.scene.gas->setup.preconditioner = plan.scene.gas->preconditioner.value_or(Preconditioner::multigrid);
-}
-
-void plan_cost(Plan& plan) {
-  const Scene& scene = plan.scene;
-  const bool history = scene.particles && scene.particles->laws.history();
-  const bool rotation = scene.particles && scene.particles->laws.rotation();
-  const auto cells = static_cast<double>(plan.cell_count);
-  const auto particles = static_cast<double>(plan.particle_count + plan.entering);  // at most: some leave
-  // Fields of gas, exchange and pressure solver; arrays and pair list of the particles (about 8 pairs within reach of each).
-  const double field = cells > 0 ? cells * sizeof(double) : 0;
-  plan.memory_bytes =
-      process_bytes * plan.ranks +
-      copies * (field * (scene.coupling ? 72 : 38) + particles * (24.0 * (rotation ? 8 : 5) + 16 + 8 * (4 + (history ? 25 : 0))));
-  const double contacts = !history ? 0 : scene.coupling ? fluidized_contacts : resting_contacts;
-  plan.checkpoint_bytes = 30e3 + field * 5 + particles * (8 + 24.0 * (rotation ? 4 : 3) + contacts * contact_bytes);
-  const auto steps = static_cast<double>(plan.steps);
-  const bool projection = scene.gas && scene.gas->setup.method == GasMethod::projection;
-  StepCost& cost = plan.cost;
-  cost.cell = projection ? projection_cell_seconds : cell_step_seconds;
-  cost.particle = plan.substeps * particle_substep_seconds + (scene.coupling ? particle_step_seconds : 0);
-  cost.pair = plan.substeps * pair_substep_seconds * (history ? history_factor : 1);
-  const double pairs = scene.coupling ? fluidized_pairs : resting_pairs;
-  plan.seconds = steps * (cells * cost.cell + particles * (cost.particle + pairs * cost.pair));
-  if (scene.particles && scene.particles->settling) {
-    const double settled = std::min(1.2 * plan.fall_time, scene.particles->settling->duration);  // at rest soon after
-    const double on_the_way = 0.5 * resting_pairs;                                               // none at first, all at the end
-    plan.seconds += settled / plan.step * particles * (cost.particle + on_the_way * cost.pair);
-  }
-  plan.seconds = start_seconds + plan.seconds / plan.ranks;
 }
 
 void check_memory(Plan& plan) {
