@@ -37,14 +37,16 @@ v1::CheckpointName checkpoint_name(const std::string& text) {
   return name;
 }
 
-void add_wall_limit(CLI::App* verb, std::optional<double>& seconds) {
-  const auto read = [&seconds](const std::string& text) {
+CLI::Option* add_time(CLI::App* verb, const char* name, std::optional<double>& seconds, const char* meaning) {
+  const auto read = [name, &seconds](const std::string& text) {
     seconds = seconds_of_text(text);
-    if (!seconds) throw CLI::ValidationError("--wall-limit", text + " is no time; say e.g. 90 (seconds), 30min, 2h or 1.5d");
+    if (!seconds) throw CLI::ValidationError(name, text + " is no time; say e.g. 90 (seconds), 30min, 2h or 1.5d");
   };
-  verb->add_option_function<std::string>("--wall-limit", read,
-                                         "stop at a checkpoint after so much wall time of an attempt: 90 (s), 30min, 2h, 1d")
-      ->type_name("TIME");
+  return verb->add_option_function<std::string>(name, read, meaning)->type_name("TIME");
+}
+
+void add_wall_limit(CLI::App* verb, std::optional<double>& seconds) {
+  add_time(verb, "--wall-limit", seconds, "stop at a checkpoint after so much wall time of an attempt: 90 (s), 30min, 2h, 1d");
 }
 
 CLI::Option* add_priority(CLI::App* verb, std::optional<int>& priority) {
@@ -60,12 +62,25 @@ void add_job_options(CLI::App* verb, JobOptions& options) {
   verb->add_option("--checkpoint-every", options.checkpoint_every, "simulated time between checkpoints, s")
       ->check(CLI::PositiveNumber);
   verb->add_option("--checkpoint-steps", options.checkpoint_steps, "steps between checkpoints")->check(CLI::PositiveNumber);
+  add_time(verb, "--checkpoint-wall", options.checkpoint_wall, "wall time between checkpoints: 90 (s), 30min, 2h")
+      ->default_str("10min");
   verb->add_option("--keep", options.keep, "so many of the newest checkpoints stay")
       ->check(CLI::Range(2, 1000000))
       ->default_str("2");
   verb->add_option("--keep-every", options.keep_every, "and of the older ones every so-manieth")->check(CLI::PositiveNumber);
   verb->add_option("--keep-every-time", options.keep_every_time, "and the first in each such span of simulated time, s")
       ->check(CLI::PositiveNumber);
+  verb->add_option("--when-disk-full", options.when_disk_full,
+                   "suspend at the newest checkpoint, or go-on without new ones and try again; older ones stay in any case")
+      ->check(CLI::IsMember({"suspend", "go-on"}))
+      ->default_str("suspend");
+  verb->add_option("--checkpoint-writers", options.checkpoint_writers,
+                   "every-rank writes its own part; one-rank writes for all, as network disks under several machines need it")
+      ->check(CLI::IsMember({"automatic", "every-rank", "one-rank"}))
+      ->default_str("automatic");
+  verb->add_option("--retries", options.retries, "after failures that are not the case's")
+      ->check(CLI::Range(0, 100))
+      ->default_str("2");
   add_wall_limit(verb, options.wall_limit);
   verb->add_option("--at-wall-limit", options.at_wall_limit,
                    "end there, to be resumed, or requeue: wait for its turn again and go on; at a checkpoint in any case")
@@ -89,6 +104,11 @@ v1::CreateJobRequest create_request(const JobOptions& options) {
   if (options.keep) spec.mutable_checkpoints()->set_keep(*options.keep);
   if (options.keep_every) spec.mutable_checkpoints()->set_keep_every_nth(*options.keep_every);
   if (options.keep_every_time) spec.mutable_checkpoints()->set_keep_every_simulated_seconds(*options.keep_every_time);
+  if (options.checkpoint_wall) spec.mutable_checkpoints()->set_every_wall_seconds(*options.checkpoint_wall);
+  if (options.when_disk_full == "go-on") spec.mutable_checkpoints()->set_when_disk_full(v1::CheckpointPolicy::GO_ON);
+  if (options.checkpoint_writers == "one-rank") spec.mutable_checkpoints()->set_writers(v1::CheckpointPolicy::ONE_RANK);
+  if (options.checkpoint_writers == "every-rank") spec.mutable_checkpoints()->set_writers(v1::CheckpointPolicy::EVERY_RANK);
+  if (options.retries) spec.mutable_retries()->set_most(*options.retries);
   if (options.wall_limit) spec.set_wall_limit_seconds(*options.wall_limit);
   if (options.at_wall_limit == "requeue") spec.set_at_wall_limit(v1::JobSpec::REQUEUE);
   if (!options.executor.empty()) spec.set_executor(options.executor);

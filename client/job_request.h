@@ -20,9 +20,13 @@ struct JobOptions {
   std::optional<std::uint64_t> checkpoint_steps;
   std::optional<std::uint32_t> keep, keep_every;  // checkpoints
   std::optional<double> keep_every_time;          // simulated s
-  std::optional<double> wall_limit;               // s
-  std::string at_wall_limit;                      // "end" or "requeue"; empty: the server's default
-  std::string executor;                           // the server's default if empty
+  std::optional<double> checkpoint_wall;          // s
+  std::string when_disk_full;                     // "suspend" or "go-on"; empty: the server's default
+  std::string checkpoint_writers;                 // "automatic", "every-rank" or "one-rank"; empty: the server's default
+  std::optional<std::uint32_t> retries;
+  std::optional<double> wall_limit;  // s
+  std::string at_wall_limit;         // "end" or "requeue"; empty: the server's default
+  std::string executor;              // the server's default if empty
   std::optional<int> priority;
   std::vector<std::string> labels;  // name=value
 };

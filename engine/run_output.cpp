@@ -42,8 +42,8 @@ void Run::write_checkpoint_now() {
   folder_.sync();  // statistics up to here are on the disk before the checkpoint is
   try {
     if (comm_.any(folder_.has_unwritten())) throw Stop(Reason::disk_full, "the disk has no room for what comes before it");
-    const CheckpointInfo info =
-        write_checkpoint(comm_, options_.folder / "checkpoints", content, {policy_.keep, stays}, options_.epoch);
+    const CheckpointInfo info = write_checkpoint(comm_, options_.folder / "checkpoints", content, {policy_.keep, stays},
+                                                 options_.epoch, policy_.one_writer);
     good_checkpoint_step_ = info.step;
     since_kept_ = stays ? 0 : since_kept_ + 1;
     folder_.checkpoint(

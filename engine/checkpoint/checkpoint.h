@@ -69,12 +69,14 @@ struct KeepCheckpoints {
 };
 
 // Collective. Writes folder/checkpoint_<step, 10 digits>.h5 by way of ….partial (file_names.h, seal.h, layout.h): layout by rank
-// 0, posix_fallocate, each rank its slabs by pwrite, fsync, manifest, fsync, verify, rename, fsync of the folder; then removes
+// 0, posix_fallocate, the slabs by pwrite, fsync, manifest, fsync, verify, rename, fsync of the folder; then removes
 // what is not to be kept, but for what is pinned, and those of later steps, which a resume from an earlier one has made void.
+// one_writer: rank 0 writes the slabs of all, to the same bits. Absent: where ranks of several machines meet on NFS or SMB, whose
+// clients write whole pages, so that two with bytes in one page may undo each other's.
 // Throws Stop on every rank alike: disk_full when there is no room (older checkpoints stay), stale_epoch when the folder's newest
 // attempt is above epoch (epoch 0: not checked), internal for other failures of the file system.
 CheckpointInfo write_checkpoint(const Comm& comm, const std::filesystem::path& folder, const CheckpointContent& content,
-                                KeepCheckpoints keep, std::uint32_t epoch = 0);
+                                KeepCheckpoints keep, std::uint32_t epoch = 0, std::optional<bool> one_writer = {});
 
 // Checks every block of a file against its manifest. Empty: good. Else names dataset and block, one line each.
 std::vector<std::string> verify_checkpoint(const std::filesystem::path& path);

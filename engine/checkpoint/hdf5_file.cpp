@@ -20,6 +20,23 @@ Hdf5Handle file_access() {
   return access;
 }
 
+// What is made by it does not tell when: a file is its content, to the bit.
+Hdf5Handle timeless(hid_t kind) {
+  Hdf5Handle creation = property_list(kind);
+  check_hdf5(H5Pset_obj_track_times(creation, false), "leave times out");
+  return creation;
+}
+
+// The groups on the way to a name, each made once.
+void make_groups(hid_t file, const std::string& name) {
+  for (auto end = name.find('/'); end != name.npos; end = name.find('/', end + 1)) {
+    const std::string group = name.substr(0, end);
+    if (H5Lexists(file, group.c_str(), H5P_DEFAULT) > 0) continue;
+    const Hdf5Handle made(H5Gcreate2(file, group.c_str(), H5P_DEFAULT, timeless(H5P_GROUP_CREATE), H5P_DEFAULT), H5Gclose,
+                          "create group " + group);
+  }
+}
+
 Hdf5Handle space(const std::vector<std::uint64_t>& shape) {
   const std::vector<hsize_t> extents(shape.begin(), shape.end());
   return Hdf5Handle(
@@ -56,7 +73,7 @@ void check_hdf5(herr_t status, const std::string& what) {
 Hdf5Handle create_checkpoint_hdf5(const std::filesystem::path& path, std::uint64_t user_block) {
   const Hdf5Handle access = file_access();
   check_hdf5(H5Pset_libver_bounds(access, H5F_LIBVER_V110, H5F_LIBVER_V110), "choose format 1.10");
-  const Hdf5Handle creation = property_list(H5P_FILE_CREATE);
+  const Hdf5Handle creation = timeless(H5P_FILE_CREATE);
   check_hdf5(H5Pset_userblock(creation, user_block), "keep a user block");
   return Hdf5Handle(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, creation, access), H5Fclose, "create " + path.string());
 }
@@ -82,14 +99,13 @@ Hdf5Handle open_hdf5(const std::filesystem::path& path) {
 }
 
 Hdf5Handle create_dataset(hid_t file, const std::string& name, hid_t type, const std::vector<std::uint64_t>& shape) {
-  const Hdf5Handle links = property_list(H5P_LINK_CREATE), creation = property_list(H5P_DATASET_CREATE);
-  check_hdf5(H5Pset_create_intermediate_group(links, 1), "make groups on the way");
+  make_groups(file, name);
+  const Hdf5Handle creation = timeless(H5P_DATASET_CREATE);
   check_hdf5(H5Pset_layout(creation, H5D_CONTIGUOUS), "choose a contiguous layout");
   check_hdf5(H5Pset_alloc_time(creation, H5D_ALLOC_TIME_EARLY), "allocate early");
   check_hdf5(H5Pset_fill_time(creation, H5D_FILL_TIME_NEVER), "fill never");
-  check_hdf5(H5Pset_obj_track_times(creation, false), "leave times out");
   const Hdf5Handle extent = space(shape);
-  return Hdf5Handle(H5Dcreate2(file, name.c_str(), type, extent, links, creation, H5P_DEFAULT), H5Dclose,
+  return Hdf5Handle(H5Dcreate2(file, name.c_str(), type, extent, H5P_DEFAULT, creation, H5P_DEFAULT), H5Dclose,
                     "create dataset " + name);
 }
 

@@ -1,8 +1,10 @@
 #include "checkpoint/posix_file.h"
 
 #include <fcntl.h>
+#include <linux/magic.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <sys/statfs.h>
 #include <sys/statvfs.h>
 #include <unistd.h>
 
@@ -126,6 +128,13 @@ void check_room(const std::filesystem::path& folder, std::uint64_t bytes) {
                                       " is above this process's limit of " + std::to_string(limit.rlim_cur) +
                                       " bytes; raise it (ulimit -f) and resume the job");
   }
+}
+
+bool is_on_network_disk(const std::filesystem::path& folder) {
+  struct statfs system {};
+  if (::statfs(folder.c_str(), &system) != 0) throw system_stop(folder, "look at", errno);
+  const auto kind = static_cast<std::uint32_t>(system.f_type);
+  return kind == NFS_SUPER_MAGIC || kind == SMB_SUPER_MAGIC || kind == CIFS_SUPER_MAGIC || kind == SMB2_SUPER_MAGIC;
 }
 
 void rename_for_good(const std::filesystem::path& from, const std::filesystem::path& to) {

@@ -61,6 +61,9 @@ Stop system_stop(const std::filesystem::path& path, const char* what, int error)
 // sizes.
 void check_room(const std::filesystem::path& folder, std::uint64_t bytes);
 
+// Whether the folder is on NFS or SMB, whose clients keep pages of a file to themselves until it is closed.
+bool is_on_network_disk(const std::filesystem::path& folder);
+
 // Renames and makes the name last: fsync of the folder.
 void rename_for_good(const std::filesystem::path& from, const std::filesystem::path& to);
 

@@ -1,5 +1,6 @@
 // Writing: layout -> room -> slabs -> fsync -> manifest and seal -> fsync -> verify -> epoch -> rename -> fsync of the folder.
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <optional>
 
@@ -14,21 +15,72 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// Writes what this rank has of every dataset, and sums it up: raw checksums, dataset by dataset, block by block.
-std::vector<std::uint32_t> write_slabs(const fs::path& path, const Layout& layout, const Manifest& manifest) {
-  const PosixFile file(path, PosixFile::Mode::write);
+// Of what this rank has: raw checksums, dataset by dataset, block by block.
+std::vector<std::uint32_t> checksums_of(const Layout& layout, const Manifest& manifest) {
   std::vector<std::uint32_t> raw;
   for (std::size_t i = 0; i < manifest.entries.size(); ++i) {
     PartialChecksums sums(manifest.entries[i].bytes);
-    for (const Run& run : layout.runs(i)) {
-      file.write(run.bytes, manifest.entries[i].place + run.place);
-      sums.add(run.bytes, run.place);
-    }
+    for (const Run& run : layout.runs(i)) sums.add(run.bytes, run.place);
     const std::vector<std::uint32_t>& blocks = sums.close();
     raw.insert(raw.end(), blocks.begin(), blocks.end());
   }
-  file.sync();
   return raw;
+}
+
+// Each rank what it has.
+void write_slabs(const fs::path& path, const Layout& layout, const Manifest& manifest) {
+  const PosixFile file(path, PosixFile::Mode::write);
+  for (std::size_t i = 0; i < manifest.entries.size(); ++i) {
+    for (const Run& run : layout.runs(i)) file.write(run.bytes, manifest.entries[i].place + run.place);
+  }
+  file.sync();
+}
+
+// What of the runs lies from `first` on and before `end`, as messages: place from `first` on, length (8 bytes each), bytes.
+std::vector<std::byte> pieces(const std::vector<Run>& runs, std::uint64_t first, std::uint64_t end) {
+  std::vector<std::byte> message;
+  for (const Run& run : runs) {
+    const std::uint64_t from = std::max(run.place, first), to = std::min(run.place + run.bytes.size(), end);
+    if (from >= to) continue;
+    const std::array<std::uint64_t, 2> head = {from - first, to - from};
+    const auto bytes = run.bytes.subspan(from - run.place, to - from);
+    message.insert(message.end(), std::as_bytes(std::span(head)).begin(), std::as_bytes(std::span(head)).end());
+    message.insert(message.end(), bytes.begin(), bytes.end());
+  }
+  return message;
+}
+
+std::vector<std::byte> joined(std::span<const std::byte> messages, std::uint64_t bytes) {
+  std::vector<std::byte> whole(bytes);
+  std::array<std::uint64_t, 2> head{};
+  while (!messages.empty()) {
+    std::memcpy(head.data(), messages.data(), sizeof(head));
+    std::memcpy(whole.data() + head[0], messages.data() + sizeof(head), head[1]);
+    messages = messages.subspan(sizeof(head) + head[1]);
+  }
+  return whole;
+}
+
+// Collective. Rank 0 what all have, a block at a time, so that it never holds more of the others' than that.
+void write_for_all(const Comm& comm, const fs::path& path, const Layout& layout, const Manifest& manifest) {
+  std::optional<PosixFile> file;
+  do_alike(comm, [&] {
+    if (comm.root()) file.emplace(path, PosixFile::Mode::write);
+  });
+  for (std::size_t i = 0; i < manifest.entries.size(); ++i) {
+    const ManifestEntry& entry = manifest.entries[i];
+    const std::vector<Run> runs = layout.runs(i);
+    for (std::uint64_t block = 0; block < entry.blocks(); ++block) {
+      const std::uint64_t first = block * block_bytes, bytes = entry.block_size(block);
+      const std::vector<std::byte> messages = comm.gather(pieces(runs, first, first + bytes));
+      do_alike(comm, [&] {
+        if (file) file->write(joined(messages, bytes), entry.place + first);
+      });
+    }
+  }
+  do_alike(comm, [&] {
+    if (file) file->sync();
+  });
 }
 
 // Joins the checksums of all ranks; on rank 0 the manifest is complete then.
@@ -112,7 +164,7 @@ void mark_as_kept(const fs::path& mark) {
 }  // namespace
 
 CheckpointInfo write_checkpoint(const Comm& comm, const fs::path& folder_given, const CheckpointContent& content,
-                                KeepCheckpoints keep, std::uint32_t epoch) {
+                                KeepCheckpoints keep, std::uint32_t epoch, std::optional<bool> one_writer) {
   fs::path folder = fs::absolute(folder_given).lexically_normal();
   if (!folder.has_filename()) folder = folder.parent_path();
   const fs::path target = folder / checkpoint_name(content.step), partial = folder / partial_name(content.step, epoch);
@@ -122,18 +174,23 @@ CheckpointInfo write_checkpoint(const Comm& comm, const fs::path& folder_given, 
   try {
     Manifest manifest;
     std::string text;
+    bool on_network = false;
     do_alike(comm, [&] {
       if (!comm.root()) return;
       fs::create_directory(folder);  // not the job's folder, should somebody have removed it
+      on_network = is_on_network_disk(folder);
       manifest = layout.create(partial, seal);
       text = manifest.text();
     });
     text = comm.broadcast(text);
+    const bool by_one = one_writer ? *one_writer : comm.machines() > 1 && comm.any(on_network);
     std::vector<std::uint32_t> raw;
     do_alike(comm, [&] {
       if (!comm.root()) manifest = Manifest::parse(text, UINT64_MAX).value();
-      raw = write_slabs(partial, layout, manifest);
+      raw = checksums_of(layout, manifest);
+      if (!by_one) write_slabs(partial, layout, manifest);
     });
+    if (by_one) write_for_all(comm, partial, layout, manifest);
     join_checksums(comm, raw, manifest);
     do_alike(comm, [&] {
       if (!comm.root()) return;

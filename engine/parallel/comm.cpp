@@ -236,6 +236,16 @@ void Comm::barrier() const {
   const Counted counted = collective(handle_->traffic);
   MPI_Barrier(handle_->comm);
 }
+int Comm::machines() const {
+  if (size_ == 1) return 1;
+  const Counted counted = collective(handle_->traffic);
+  MPI_Comm here = MPI_COMM_NULL;
+  int rank_here = 0;
+  MPI_Comm_split_type(handle_->comm, MPI_COMM_TYPE_SHARED, rank_, MPI_INFO_NULL, &here);
+  MPI_Comm_rank(here, &rank_here);
+  MPI_Comm_free(&here);
+  return static_cast<int>(sum(std::int64_t{rank_here == 0}));
+}
 Traffic Comm::traffic() const {
   return handle_->traffic;
 }

@@ -53,6 +53,11 @@ class FirstFault : public google::protobuf::io::ErrorCollector {
   std::string text;
 };
 
+std::optional<bool> one_writer(v1::CheckpointPolicy::Writers writers) {
+  if (writers == v1::CheckpointPolicy::AUTOMATIC) return std::nullopt;
+  return writers == v1::CheckpointPolicy::ONE_RANK;
+}
+
 }  // namespace
 
 RunPolicy read_policy(const std::filesystem::path& folder) {
@@ -71,6 +76,7 @@ RunPolicy read_policy(const std::filesystem::path& folder) {
           .keep_every_nth = checkpoints.keep_every_nth(),
           .keep_every_simulated = checkpoints.keep_every_simulated_seconds(),
           .go_on_when_full = checkpoints.when_disk_full() == v1::CheckpointPolicy::GO_ON,
+          .one_writer = one_writer(checkpoints.writers()),
           .wall_limit = spec.wall_limit_seconds()};
 }
 

@@ -30,6 +30,7 @@ struct RunPolicy {
   std::uint64_t keep_every_nth = 0;
   double keep_every_simulated = 0;  // s
   bool go_on_when_full = false;     // a full disk stops the run otherwise
+  std::optional<bool> one_writer;   // of checkpoints; absent: as the disk needs it
   double wall_limit = 0;            // s
 };
 // From job.txtpb; the defaults of the schema if there is none. Throws Stop(invalid_case) naming line and column.

@@ -219,6 +219,22 @@ class Usage(unittest.TestCase):
                              "owner,jobs,running,disk,cpu_hours,memory,quota")
 
 
+class Policies(unittest.TestCase):
+    def test_a_job_of_two_ranks_holds_what_its_options_say_and_one_of_them_writes(self):
+        with RealServer() as server:
+            job = run_to_end(server, "--ranks", 2, "--checkpoint-steps", 5, "--checkpoint-wall", "30min", "--retries", 4,
+                             "--when-disk-full", "go-on", "--checkpoint-writers", "one-rank", end=0.004)
+            spec = shown(server, job)["spec"]
+            self.assertEqual(spec["retries"], {"most": 4})
+            self.assertEqual({name: spec["checkpoints"][name] for name in ("every_wall_seconds", "when_disk_full", "writers")},
+                             {"every_wall_seconds": 1800, "when_disk_full": "GO_ON", "writers": "ONE_RANK"})
+            for step in steps_of(server, job):
+                self.assertEqual(server.client("checkpoint", "verify", f"{job}@{step}").returncode, 0)
+            refused = server.client("submit", "settling", "--checkpoint-wall", "soon")
+            self.assertEqual(refused.returncode, 2)
+            self.assertIn("soon is no time", refused.stderr)
+
+
 class Retention(unittest.TestCase):
     def test_the_engine_keeps_what_the_policy_says_and_tells_what_it_removed(self):
         with RealServer() as server:

@@ -34,6 +34,12 @@ class Jobs(unittest.TestCase):
         self.assertEqual(list(connection.jobs(labels={"study": "two"})), [])
         self.assertEqual(connection.job(job.id).case().particles.random.count, 500)
 
+    def test_what_else_a_job_may_ask_for_is_text_of_its_message(self):
+        other = connection.submit(bed(end=0.002), spec="checkpoints { keep: 4 when_disk_full: GO_ON } retries { most: 0 }").wait(60)
+        self.assertEqual(other.message.spec.checkpoints.keep, 4)
+        self.assertEqual(other.message.spec.checkpoints.when_disk_full, 1)
+        self.assertEqual(other.message.spec.retries.most, 0)
+
     def test_a_case_is_text_a_file_or_a_message(self):
         with tempfile.TemporaryDirectory() as folder:
             path = pathlib.Path(folder) / "case.txtpb"

@@ -179,11 +179,13 @@ TEST(NewestGoodCheckpoint, IsNoneInAnEmptyOrMissingFolder) {
 }
 
 void expect_disk_full(const Comm& comm, const fs::path& folder) {
-  try {
-    write_checkpoint(comm, folder, content_of(comm, 2, several_blocks), 2);
-    ADD_FAILURE() << "a checkpoint was written where there is no room";
-  } catch (const Stop& stop) {
-    EXPECT_EQ(stop.reason, Reason::disk_full) << stop.what();
+  for (const bool one_writer : {false, true}) {
+    try {
+      write_checkpoint(comm, folder, content_of(comm, 2, several_blocks), 2, 0, one_writer);
+      ADD_FAILURE() << "a checkpoint was written where there is no room";
+    } catch (const Stop& stop) {
+      EXPECT_EQ(stop.reason, Reason::disk_full) << stop.what();
+    }
   }
   comm.barrier();
   EXPECT_EQ(std::distance(fs::directory_iterator(folder), fs::directory_iterator()), 1) << "the partial file is still there";

@@ -42,6 +42,33 @@ TEST(Checkpoint, SameRanksReadTheBitsTheyWrote) {
   EXPECT_EQ(reader.rows("statistics/bins"), reals(content.arrays[5]));
 }
 
+std::string bytes_of(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+// Arrays of several blocks, grids cut by ranks, rows across blocks, empty ones: the path of every byte to the disk is another.
+TEST(Checkpoint, OneRankWritesForAllTheFileThatEachWouldWriteItsPartOf) {
+  const Comm comm = Comm::world();
+  const SharedFolder folder(comm);
+  CheckpointContent content = content_of(comm, 42, 300000);
+  const std::int64_t wide = 40000 * (comm.rank() + 1), before = comm.sum_before(wide);
+  std::vector<double> many(static_cast<std::size_t>(3 * wide));
+  for (std::size_t i = 0; i < many.size(); ++i) many[i] = std::cos(static_cast<double>(3 * before) + static_cast<double>(i));
+  content.arrays.push_back({"particles/velocity", "m/s", "many rows of every rank", many, std::nullopt, 3});
+  const auto written = [&](bool one_writer) {
+    const CheckpointInfo info = write_checkpoint(comm, folder.checkpoints(), content, 2, 0, one_writer);
+    comm.barrier();
+    const std::string bytes = bytes_of(info.path);
+    comm.barrier();
+    return bytes;
+  };
+  const std::string by_each = written(false), by_one = written(true);
+  EXPECT_GT(by_each.size(), 3U << 20);
+  EXPECT_TRUE(by_each == by_one);
+  EXPECT_EQ(verify_checkpoint(folder.checkpoints() / "checkpoint_0000000042.h5"), std::vector<std::string>{});
+}
+
 TEST(Checkpoint, OneRankReadsWhatManyWrote) {
   const Comm comm = Comm::world();
   const SharedFolder folder(comm);

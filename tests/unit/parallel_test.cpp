@@ -177,6 +177,11 @@ TEST(Comm, AMaximumIsUnderWayWhileExchangesPass) {
   }
 }
 
+TEST(Comm, RanksOfOneMachineAreOnOneMachine) {
+  EXPECT_EQ(Comm::world().machines(), 1);
+  EXPECT_EQ(Comm::self().machines(), 1);
+}
+
 TEST(Comm, ExchangeAllDeliversEveryMessage) {
   const Comm world = Comm::world();
   std::vector<std::vector<double>> messages(world.size());

@@ -79,10 +79,12 @@ class Server:
 
     def submit(self, case: CaseLike | None = None, *, ranks: int = 1, start_from: Job | None = None, step: int | None = None,
                labels: Mapping[str, str] | None = None, checkpoint_every: float | None = None,
-               wall_limit: float | None = None, requeue: bool = False, executor: str | None = None, priority: int = 0) -> Job:
+               wall_limit: float | None = None, requeue: bool = False, executor: str | None = None, priority: int = 0,
+               spec: str = "") -> Job:
         """Hands a case to the server; the job is safe once this returns. start_from: begin at a checkpoint of that job (the newest,
         or that of a step), without a case with its own. wall_limit: s an attempt; requeue: go on after it when its turn comes
-        again. executor: "local" or "slurm". Raises Error with all faults of the case."""
+        again. executor: "local" or "slurm". spec: what else a JobSpec holds, as in "checkpoints { keep: 4 when_disk_full: GO_ON }".
+        Raises Error with all faults of the case."""
         request = self._request(case, ranks, labels, checkpoint_every, wall_limit)
         if requeue:
             request.spec.at_wall_limit = job_pb2.JobSpec.REQUEUE
@@ -90,6 +92,7 @@ class Server:
             request.spec.executor = executor
         if priority:
             request.spec.priority = priority
+        text_format.Merge(spec, request.spec)
         request.request_id = str(uuid.uuid4())  # makes a retry harmless
         if start_from is not None:
             request.start_from.job = start_from.id
