@@ -117,6 +117,15 @@ std::string log_tics(double low, double high) {
   return text;
 }
 
+// In a picture of many points only these are named: those that differ, and those that cost another amount than the reference.
+bool stands_out(const v1::Study& study, int point, int quantity) {
+  constexpr int many = 12;
+  constexpr double another_amount = 1.25;
+  const auto& run = study.runs(point);
+  const double speed_up = study.runs(static_cast<int>(study.spec().reference())).cost().cpu_seconds() / run.cost().cpu_seconds();
+  return study.runs_size() <= many || !run.errors(quantity).equal() || speed_up > another_amount || speed_up < 1 / another_amount;
+}
+
 // One point of a line in the picture: cost, error and interval in per cent, and what to write beside it.
 std::string plot_row(const v1::Study& study, int point, int quantity) {
   const auto& run = study.runs(point);
@@ -125,7 +134,7 @@ std::string plot_row(const v1::Study& study, int point, int quantity) {
   const bool is_reference = point == static_cast<int>(study.spec().reference());
   const double value = relative(study, quantity, error.value()), half = relative(study, quantity, error.half_width());
   return number_text(run.cost().cpu_seconds()) + " " + number_text(value) + " " + number_text(is_reference ? 0 : half) + " " +
-         gnuplot_quoted(values_of(study.spec(), point)) + "\n";
+         gnuplot_quoted(stands_out(study, point, quantity) ? values_of(study.spec(), point) : "") + "\n";
 }
 
 }  // namespace
@@ -212,7 +221,7 @@ std::string study_plot(const v1::Study& study, const std::filesystem::path& file
     cheapest = std::min(cheapest, run.cost().cpu_seconds());
     dearest = std::max(dearest, run.cost().cpu_seconds());
   }
-  text += "set key below center maxrows 1 Left reverse samplen 2 nobox\nset logscale x\n";
+  text += "set key below center maxrows 1 Left reverse samplen 2 nobox height 1.2\nset logscale x\n";
   if (dearest > 0) {
     text += "set xrange [" + number_text(0.8 * cheapest) + ":" + number_text(1.4 * dearest) + "]\n";
     text += "set xtics (" + log_tics(0.8 * cheapest, 1.4 * dearest) + ")\n";
