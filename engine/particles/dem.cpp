@@ -13,13 +13,6 @@ namespace bedflow {
 
 namespace {
 
-template <class T>
-void reorder(std::vector<T>& elements, const std::vector<std::uint32_t>& order) {
-  std::vector<T> sorted(order.size());
-  for (std::size_t i = 0; i < order.size(); ++i) sorted[i] = elements[order[i]];
-  elements.swap(sorted);
-}
-
 // Calls run with the values as constants.
 template <class Run, bool... known>
 void with_constants(Run run, std::integer_sequence<bool, known...> constants) {
@@ -58,7 +51,8 @@ Dem::Dem(const Decomposition& decomposition, const DemSetup& setup, ContactLaws 
       cells_(setup.types.size()),
       tuner_(2 * setup.largest_radius(), setup.widest_skin),
       walls_(std::move(walls), decomposition.size(), reach_with(std::max(setup.skin, setup.widest_skin))),
-      loads_(faces_.size() + walls_.size()) {
+      loads_(faces_.size() + walls_.size()),
+      history_(setup_.rolling_history) {
   ghosts_.set_reach(reach());
 }
 
@@ -144,28 +138,34 @@ void Dem::rebuild() {
     const PhaseTimer::Scope migration(timer_, Phase::migration, particles_.owned);
     migrate(decomposition_, setup_, particles_, history_);
   }
-  place_ = particles_.positions();
+  place_.clear();
+  for (std::size_t i = 0; i < particles_.owned; ++i) place_.push_back(particles_.position(i));
   build_list();
   ++rebuilds_;
 }
 
 // By type, and in space by the places at the rebuild, which leaves a stored order as it is.
 void Dem::sort() {
-  std::vector<std::vector<std::uint32_t>> members(setup_.types.size());
-  for (std::size_t i = 0; i < particles_.owned; ++i)
-    members[particles_.type.empty() ? 0 : particles_.type[i]].push_back(static_cast<std::uint32_t>(i));
-  std::vector<std::uint32_t> order;
-  std::vector<Vec3> places;
-  for (std::size_t type = 0; type < members.size(); ++type) {
-    places.clear();
-    for (const std::uint32_t i : members[type]) places.push_back(place_[i]);
-    const double edge = 2 * setup_.types[type].radius + setup_.range + setup_.skin;
-    cells_[type].sort(places, edge, static_cast<std::uint32_t>(order.size()));
-    for (const std::uint32_t k : cells_[type].order()) order.push_back(members[type][k]);
+  const auto edge = [&](std::size_t type) { return 2 * setup_.types[type].radius + setup_.range + setup_.skin; };
+  std::vector<std::uint32_t>& order = reorder_.order;
+  if (setup_.types.size() == 1) {
+    cells_[0].sort(place_, edge(0));
+    order = cells_[0].order();
+  } else {
+    std::vector<std::vector<std::uint32_t>> members(setup_.types.size());
+    for (std::size_t i = 0; i < particles_.owned; ++i) members[particles_.type[i]].push_back(static_cast<std::uint32_t>(i));
+    order.clear();
+    std::vector<Vec3> places;
+    for (std::size_t type = 0; type < members.size(); ++type) {
+      places.clear();
+      for (const std::uint32_t i : members[type]) places.push_back(place_[i]);
+      cells_[type].sort(places, edge(type), static_cast<std::uint32_t>(order.size()));
+      for (const std::uint32_t k : cells_[type].order()) order.push_back(members[type][k]);
+    }
   }
-  particles_.each_array(setup_, [&](auto& array) { reorder(array, order); });
-  reorder(place_, order);
-  reorder(history_.heads(), order);
+  particles_.each_array(setup_, [&](auto& array) { reorder_(array); });
+  reorder_(place_);
+  reorder_(history_.heads());
 }
 
 void Dem::build_list() {
@@ -174,7 +174,6 @@ void Dem::build_list() {
   list_.build(cells_, setup_, faces_, particles_, place_, ghosts_.shifts());
   list_.load(particles_, now_, history_);
   walls_.load(now_, history_, particles_.owned);
-  history_ = {};  // as much as all the rest of a particle
   force_.assign(particles_.owned, {});
   place_.push_back({});
 }

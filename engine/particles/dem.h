@@ -17,6 +17,7 @@
 #include "particles/history.h"
 #include "particles/laws.h"
 #include "particles/pair_list.h"
+#include "particles/reorder.h"
 #include "particles/skin_tuner.h"
 #include "particles/store.h"
 #include "particles/turnover.h"
@@ -135,7 +136,8 @@ class Dem {
   Walls walls_;
   std::vector<WallLoad> loads_;  // of the six faces, then of the walls: summed over the sub-steps
   int loaded_ = 0;               // sub-steps in them
-  ContactHistory history_;       // only while the list is rebuilt
+  ContactHistory history_;       // while the list is rebuilt
+  Reorder reorder_;              // likewise
   double now_ = 0;               // number of the last sub-step
   double deepest_ = 0;
   std::int64_t contacts_ = 0, rebuilds_ = 0;

@@ -49,10 +49,16 @@ void PairList::build(const std::vector<Cells>& cells, const DemSetup& setup, con
   }
   sort_into_groups(setup, particles);
   build_near(setup, faces, particles, places.first(particles.owned));
-  pair_memory.displacement.assign(setup.history ? pairs.size() : 0, {});
-  pair_memory.angle.assign(setup.rolling_history ? pairs.size() : 0, {});
-  wall_memory.displacement.assign(setup.history ? near.size() : 0, {});
-  wall_memory.angle.assign(setup.rolling_history ? near.size() : 0, {});
+  const auto begin = [](Memory& memory, bool displacement, bool angle, std::size_t count) {
+    for (auto [rows, kept] : {std::pair(&memory.displacement, displacement), std::pair(&memory.angle, angle)}) {
+      rows->clear();
+      if (!kept) continue;
+      if (rows->capacity() < count) rows->reserve(count + count / 8);  // lists grow for long while a bed settles
+      rows->assign(count, {});
+    }
+  };
+  begin(pair_memory, setup.history, setup.rolling_history, pairs.size());
+  begin(wall_memory, setup.history, setup.rolling_history, near.size());
   pairs.resize(pairs.size() + native_lanes);
 }
 
@@ -113,14 +119,13 @@ void PairList::load(const ParticleStore& particles, double now, const ContactHis
   for (std::size_t p = 0; p < count(); ++p) {
     const auto [first, second] = pairs[p];
     if (first < particles.owned) {
-      if (const ContactMemory* seen = history.find(first, particles.id[second])) take(pair_memory, p, *seen);
-    } else if (const ContactMemory* seen = history.find(second, particles.id[first])) {
+      if (const auto seen = history.find(first, particles.id[second])) take(pair_memory, p, *seen);
+    } else if (const auto seen = history.find(second, particles.id[first])) {
       take(pair_memory, p, -*seen);
     }
   }
   for (std::size_t w = 0; w < near.size(); ++w)
-    if (const ContactMemory* seen = history.find(near[w].particle, ContactHistory::wall_contact(near[w].face)))
-      take(wall_memory, w, *seen);
+    if (const auto seen = history.find(near[w].particle, ContactHistory::wall_contact(near[w].face))) take(wall_memory, w, *seen);
 }
 
 }  // namespace bedflow
