@@ -23,12 +23,21 @@ constexpr double particle_step_seconds = 0.036e-6;  // to the grid and back
 constexpr double cell_step_seconds = 0.125e-6;      // two outer iterations of SIMPLE, in a bed whose drag holds the gas
 constexpr double clear_cell_seconds = 0.22e-6;      // without
 constexpr double projection_cell_seconds = 0.13e-6;
-constexpr double start_seconds = 0.02;        // of the process
-constexpr double plot_file_seconds = 1.5e-3;  // laid out
-constexpr double process_bytes = 27e6;        // with MPI and HDF5, before it holds anything
-constexpr double copies = 1.9;                // of what it holds, while a list is rebuilt or a checkpoint written
-constexpr double contact_bytes = 64;          // in a checkpoint
+constexpr double start_seconds = 0.02;                        // of the process
+constexpr double plot_file_seconds = 1.5e-3;                  // laid out
+constexpr double process_bytes = 27e6;                        // with MPI and HDF5, before it holds anything
+constexpr double particle_bytes = 580;                        // rows, list and what rebuilding takes, five contacts each
+constexpr double history_bytes = 480;                         // of it where contacts remember
+constexpr double coupled_particle_bytes = 300;                // stencils, weights, what is sampled
+constexpr double cell_fields = 44, coupled_cell_fields = 50;  // of gas and pressure solver, and of the exchange
+constexpr double cache_bytes = 50e6;
+constexpr double contact_bytes = 64;                                // in a checkpoint
 constexpr double fluidized_contacts = 0.5, resting_contacts = 2.5;  // a particle, with history
+
+// How much dearer a sweep gets over more than a core has of the cache (100 000 to a million particles, 64³ to 128³ cells).
+double beyond_cache(double bytes) {
+  return std::clamp(1 + 0.4 * std::log2(bytes / cache_bytes), 1.0, 2.2);
+}
 
 // Share of their pairs that particles at rest keep: in a heap of few layers many lie at its surfaces.
 double kept_pairs(const Plan& plan, double particles) {
@@ -50,11 +59,11 @@ void plan_cost(Plan& plan) {
   const bool rotation = scene.particles && scene.particles->laws.rotation();
   const auto cells = static_cast<double>(plan.cell_count);
   const auto particles = static_cast<double>(plan.particle_count + plan.entering);  // at most: some leave
-  // Fields of gas, exchange and pressure solver; arrays and pair list of the particles (about 8 pairs within reach of each).
   const double field = cells > 0 ? cells * sizeof(double) : 0;
+  const double gas_bytes = field * (scene.coupling ? coupled_cell_fields : cell_fields);
+  const double dem_bytes = particles * (particle_bytes + (history ? history_bytes : 0));
   plan.memory_bytes =
-      process_bytes * plan.ranks +
-      copies * (field * (scene.coupling ? 72 : 38) + particles * (24.0 * (rotation ? 8 : 5) + 16 + 8 * (4 + (history ? 25 : 0))));
+      process_bytes * plan.ranks + gas_bytes + dem_bytes + (scene.coupling ? particles * coupled_particle_bytes : 0);
   const double contacts = !history ? 0 : scene.coupling ? fluidized_contacts : resting_contacts;
   plan.checkpoint_bytes = 30e3 + field * 5 + particles * (8 + 24.0 * (rotation ? 4 : 3) + contacts * contact_bytes);
   const auto steps = static_cast<double>(plan.steps);
@@ -67,11 +76,12 @@ void plan_cost(Plan& plan) {
   const bool falls = scene.particles && !scene.particles->settling && !scene.coupling;
   const double falling = falls ? std::min(1.0, 1.2 * plan.fall_time / scene.end_time) : 0;  // none at first, all at the end
   const double pairs = scene.coupling ? fluidized_pairs : (1 - 0.5 * falling) * at_rest;
-  plan.seconds = steps * (cells * cost.cell + particles * (cost.particle + pairs * cost.pair));
+  const double dem = beyond_cache(dem_bytes / plan.ranks), gas = beyond_cache(gas_bytes / plan.ranks);
+  plan.seconds = steps * (gas * cells * cost.cell + dem * particles * (cost.particle + pairs * cost.pair));
   if (scene.particles && scene.particles->settling) {
     const double settled = std::min(1.2 * plan.fall_time, scene.particles->settling->duration);  // at rest soon after
     const double on_the_way = 0.5 * at_rest;
-    plan.seconds += settled / plan.step * particles * (cost.particle + on_the_way * cost.pair);
+    plan.seconds += settled / plan.step * dem * particles * (cost.particle + on_the_way * cost.pair);
   }
   const double files = scene.plot_interval ? scene.end_time / *scene.plot_interval : 0;
   plan.seconds = start_seconds + files * plot_file_seconds + plan.seconds / plan.ranks;
