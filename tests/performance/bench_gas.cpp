@@ -62,6 +62,7 @@ class MovingBed {
         exchange_.buoyancy[d](i, j, k) = solids;
       });
     }
+    Comm::world().barrier();  // no rank waits within its step for the others' particles
   }
   GasOutcome step() {
     GasOutcome outcome = solver_.advance(state_, &exchange_, time_, bed_.dt);
