@@ -27,7 +27,8 @@ constexpr double start_seconds = 0.02;                        // of the process
 constexpr double plot_file_seconds = 1.5e-3;                  // laid out
 constexpr double process_bytes = 27e6;                        // with MPI and HDF5, before it holds anything
 constexpr double particle_bytes = 580;                        // rows, list and what rebuilding takes, five contacts each
-constexpr double history_bytes = 480;                         // of it where contacts remember
+constexpr double moved_bytes = 150;                           // of it what motion alone touches
+constexpr double history_bytes = 480;                         // more where contacts remember
 constexpr double coupled_particle_bytes = 300;                // stencils, weights, what is sampled
 constexpr double cell_fields = 44, coupled_cell_fields = 50;  // of gas and pressure solver, and of the exchange
 constexpr double cache_bytes = 50e6;
@@ -37,6 +38,12 @@ constexpr double fluidized_contacts = 0.5, resting_contacts = 2.5;  // a particl
 // How much dearer a sweep gets over more than a core has of the cache (100 000 to a million particles, 64³ to 128³ cells).
 double beyond_cache(double bytes) {
   return std::clamp(1 + 0.4 * std::log2(bytes / cache_bytes), 1.0, 2.2);
+}
+
+// Mean over a run of the share of particles that lie on the ground: those that fall from all heights land as t², until `fall`
+// (of the run's time) has passed.
+double landed(double fall) {
+  return fall < 1 ? 1 - 2 * fall / 3 : 1 / (3 * fall * fall);
 }
 
 // Share of their pairs that particles at rest keep: in a heap of few layers many lie at its surfaces.
@@ -74,14 +81,16 @@ void plan_cost(Plan& plan) {
   cost.pair = plan.substeps * pair_substep_seconds * (history ? history_factor : 1);
   const double at_rest = scene.particles ? resting_pairs * kept_pairs(plan, particles) : 0;
   const bool falls = scene.particles && !scene.particles->settling && !scene.coupling;
-  const double falling = falls ? std::min(1.0, 1.2 * plan.fall_time / scene.end_time) : 0;  // none at first, all at the end
-  const double pairs = scene.coupling ? fluidized_pairs : (1 - 0.5 * falling) * at_rest;
-  const double dem = beyond_cache(dem_bytes / plan.ranks), gas = beyond_cache(gas_bytes / plan.ranks);
-  plan.seconds = steps * (gas * cells * cost.cell + dem * particles * (cost.particle + pairs * cost.pair));
+  const double pairs = scene.coupling ? fluidized_pairs : falls ? landed(plan.fall_time / scene.end_time) * at_rest : at_rest;
+  const auto particle_seconds = [&](double listed) {  // a step
+    const double touched = moved_bytes + listed / resting_pairs * (dem_bytes / particles - moved_bytes);
+    return beyond_cache(particles * touched / plan.ranks) * (cost.particle + listed * cost.pair);
+  };
+  plan.seconds = steps * cells * cost.cell * beyond_cache(gas_bytes / plan.ranks);
+  if (particles > 0) plan.seconds += steps * particles * particle_seconds(pairs);
   if (scene.particles && scene.particles->settling) {
     const double settled = std::min(1.2 * plan.fall_time, scene.particles->settling->duration);  // at rest soon after
-    const double on_the_way = 0.5 * at_rest;
-    plan.seconds += settled / plan.step * dem * particles * (cost.particle + on_the_way * cost.pair);
+    plan.seconds += settled / plan.step * particles * particle_seconds(0.5 * at_rest);
   }
   const double files = scene.plot_interval ? scene.end_time / *scene.plot_interval : 0;
   plan.seconds = start_seconds + files * plot_file_seconds + plan.seconds / plan.ranks;

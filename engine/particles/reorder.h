@@ -17,6 +17,7 @@ class Reorder {
   template <class T>
   void operator()(std::vector<T>& elements) {
     static_assert(std::is_trivially_copyable_v<T>);
+    if (order.empty()) return elements.clear();
     const std::size_t bytes = order.size() * sizeof(T);
     if (room_.size() < bytes) room_.resize(bytes);
     std::byte* to = room_.data();

@@ -59,7 +59,7 @@ TEST(Checkpoint, OneRankWritesForAllTheFileThatEachWouldWriteItsPartOf) {
   const auto written = [&](bool one_writer) {
     const CheckpointInfo info = write_checkpoint(comm, folder.checkpoints(), content, 2, 0, one_writer);
     comm.barrier();
-    const std::string bytes = bytes_of(info.path);
+    std::string bytes = bytes_of(info.path);
     comm.barrier();
     return bytes;
   };
