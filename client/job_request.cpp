@@ -67,7 +67,7 @@ void add_job_options(CLI::App* verb, JobOptions& options) {
   verb->add_option("--keep", options.keep, "so many of the newest checkpoints stay")
       ->check(CLI::Range(2, 1000000))
       ->default_str("2");
-  verb->add_option("--keep-every", options.keep_every, "and of the older ones every so-manieth")->check(CLI::PositiveNumber);
+  verb->add_option("--keep-every", options.keep_every, "and of the older ones every N-th")->check(CLI::PositiveNumber);
   verb->add_option("--keep-every-time", options.keep_every_time, "and the first in each such span of simulated time, s")
       ->check(CLI::PositiveNumber);
   verb->add_option("--when-disk-full", options.when_disk_full,
