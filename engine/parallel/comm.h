@@ -76,7 +76,7 @@ class Comm {
   std::vector<std::vector<double>> exchange_all(const std::vector<std::vector<double>>& messages) const;
 
   void barrier() const;
-  int machines() const;  // on which the ranks run; collective
+  int machines() const;     // on which the ranks run; collective
   Traffic traffic() const;  // of all copies of this Comm together; nothing with one rank
   [[noreturn]] void abort(int exit_code) const;
 
