@@ -13,20 +13,19 @@ struct Held {
   const MemoryRow *displacement, *angle;
 };
 
-// Laws without a spring hold nothing.
-template <class Law>
-double spring_energy(const Law& law, const Held& held, const MemoryRow* memory, double now) {
-  if constexpr (requires { law.energy(held.touching, Vec3{}); }) {
-    return memory && memory->touched == now ? law.energy(held.touching, memory->value) : 0;
-  } else {
-    return 0;
-  }
-}
-
 // The two tables of a law are of pairs and of walls.
 template <bool walls, class Law>
 const Law& chosen(const LawTable<Law>& table, std::size_t index) {
   return walls ? table.walls[index] : table.pairs[index];
+}
+
+// Laws without a spring hold nothing, and their tables may be empty.
+template <bool walls, class Law>
+double spring_energy(const LawTable<Law>& table, const Held& held, const MemoryRow* memory, double now) {
+  if constexpr (requires(const Law& law) { law.energy(held.touching, Vec3{}); }) {
+    if (memory && memory->touched == now) return chosen<walls>(table, held.law).energy(held.touching, memory->value);
+  }
+  return 0;
 }
 
 template <bool walls>
@@ -34,10 +33,8 @@ ContactEnergy energy_of(const Held& held, const ContactLaws& laws, double now) {
   ContactEnergy energy;
   if (held.touching.overlap > 0) {
     const auto normal = [&](const auto& table) { return chosen<walls>(table, held.law).energy(held.touching); };
-    const auto tangential = [&](const auto& table) {
-      return spring_energy(chosen<walls>(table, held.law), held, held.displacement, now);
-    };
-    const auto rolling = [&](const auto& table) { return spring_energy(chosen<walls>(table, held.law), held, held.angle, now); };
+    const auto tangential = [&](const auto& table) { return spring_energy<walls>(table, held, held.displacement, now); };
+    const auto rolling = [&](const auto& table) { return spring_energy<walls>(table, held, held.angle, now); };
     energy.stored =
         std::visit(normal, laws.contact) + std::visit(tangential, laws.tangential) + std::visit(rolling, laws.rolling);
   }

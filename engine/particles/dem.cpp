@@ -97,8 +97,8 @@ void Dem::take_ghosts() {
 
 void Dem::forward_ghosts() {
   constexpr std::size_t row = sizeof(ParticleRow) / sizeof(double);
-  const GhostExchange::Column columns[] = {{&particles_.rows.data()->position.x, row, setup_.rotation ? row : 6},
-                                           {particles_.spin_z.data(), 1, 1}};
+  double* first = particles_.rows.empty() ? nullptr : &particles_.rows.front().position.x;
+  const GhostExchange::Column columns[] = {{first, row, setup_.rotation ? row : 6}, {particles_.spin_z.data(), 1, 1}};
   ghosts_.forward(std::span(columns).first(setup_.rotation ? 2 : 1));
 }
 
