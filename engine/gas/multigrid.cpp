@@ -39,11 +39,16 @@ void Multigrid::cycle(std::size_t l) {
     take_part(next, level);
     return;
   }
-  for (int n = 1; n < level.half_sweeps; ++n) relax(level, n % 2);
+  const auto relax_anew = [&](int colour) {  // which hangs on the other colour alone
+    fill_ghosts(level, 1 - colour);
+    relax(level, colour);
+  };
+  for (int n = 1; n < level.half_sweeps; ++n) relax_anew(n % 2);
+  fill_ghosts(level, (level.half_sweeps - 1) % 2);
   restrict_residual(level, next);
   cycle(l + 1);
   prolong(next, level);
-  for (int n = level.half_sweeps; n-- > 0;) relax(level, n % 2);
+  for (int n = level.half_sweeps; n-- > 0;) relax_anew(n % 2);
 }
 
 void Multigrid::solve_coarsest() {
@@ -80,7 +85,6 @@ void Multigrid::start(Level& level) {
 // own (reading what has just been written would hold the processor up).
 void Multigrid::relax(Level& level, int colour) {
   if (level.lines >= 0) return relax_lines(level, colour);
-  fill_ghosts(level);
   const std::ptrdiff_t sy = level.stride(1), sz = level.stride(2);
   const auto layer = static_cast<int>(level.layer());
   float* next = row_.data();
@@ -104,7 +108,6 @@ void Multigrid::relax(Level& level, int colour) {
 }
 
 void Multigrid::restrict_residual(Level& fine, Level& coarse) {
-  fill_ghosts(fine);
   const std::ptrdiff_t sy = fine.stride(1), sz = fine.stride(2);
   const auto n = static_cast<int>(fine.layer());
   float* sum = row_.data();
@@ -159,38 +162,48 @@ void Multigrid::prolong(const Level& coarse, Level& fine) {
 
 // ------------------------------------------------------------------------------------------------ between ranks
 
-void Multigrid::fill_ghosts(Level& level) {
+// Of x, in cells of a colour; in all where lines are smoothed, or an odd number of cells closes on itself, so that two of one
+// colour meet.
+void Multigrid::fill_ghosts(Level& level, int colour) {
   for (int d = 0; d < 3; ++d) {
+    const std::array<int, 2>& neighbours = level.neighbour[d];
+    if (neighbours[0] < 0 && neighbours[1] < 0) continue;
     const int t1 = (d + 1) % 3, t2 = (d + 2) % 3, n1 = level.cells[t1], n2 = level.cells[t2];
     const std::ptrdiff_t s1 = level.stride(t1), s2 = level.stride(t2);
-    const auto layer = [&](int at) {
+    const bool all = level.lines >= 0 || (periodic(d) && level.global[d] % 2 == 1);
+    const int step = all ? 1 : 2;
+    const auto skipped = [&](int at) { return all ? 0 : (at + level.parity + colour) & 1; };  // cells before the first to pass
+    const auto passing = [&](int at) { return static_cast<std::size_t>((n1 * n2 + step - 1 - skipped(at)) / step); };
+    // Act(cell that passes, its number), for layer `at`, of this block or the one beside.
+    const auto for_layer = [&](int at, auto act) {
       Int3 corner{0, 0, 0};
       corner[d] = at;
-      return level.x.data() + level.index(corner[0], corner[1], corner[2]);
+      float* layer = level.x.data() + level.index(corner[0], corner[1], corner[2]);
+      std::size_t m = 0;
+      for (int b = 0; b < n2; ++b)
+        for (int a = skipped(at + b); a < n1; a += step) act(layer[a * s1 + b * s2], m++);
     };
-    for (int side = 0; side < 2; ++side) {  // send towards `side`, receive from the other
-      const int to = level.neighbour[d][side], from = level.neighbour[d][1 - side];
-      if (to < 0 && from < 0) continue;
-      const float* source = layer(side == 0 ? 0 : level.cells[d] - 1);
-      float* target = layer(side == 0 ? level.cells[d] : -1);
-      send_.clear();
-      for (int b = 0; b < n2 && to >= 0; ++b)
-        for (int a = 0; a < n1; ++a) send_.push_back(static_cast<double>(source[a * s1 + b * s2]));
-      receive_.resize(from >= 0 ? static_cast<std::size_t>(n1) * n2 : 0);
-      decomposition_.comm().exchange(to, send_, from, std::span<double>(receive_));
-      const double* next = receive_.data();
-      for (int b = 0; b < n2 && from >= 0; ++b)
-        for (int a = 0; a < n1; ++a) target[a * s1 + b * s2] = static_cast<float>(*next++);
+    const std::array<int, 2> ghosts = {-1, level.cells[d]}, owners = {0, level.cells[d] - 1};
+    for (int side = 0; side < 2; ++side) {
+      if (neighbours[side] < 0) continue;
+      send_[side].resize(passing(owners[side]));
+      receive_[side].resize(passing(ghosts[side]));
+      for_layer(owners[side], [out = send_[side].data()](float here, std::size_t m) { out[m] = here; });
+    }
+    decomposition_.comm().exchange(neighbours, send_, receive_);
+    for (int side = 0; side < 2; ++side) {
+      if (neighbours[side] < 0) continue;
+      for_layer(ghosts[side], [in = receive_[side].data()](float& here, std::size_t m) { here = in[m]; });
     }
   }
 }
 
 void Multigrid::gather(const Level& part, Level& whole) {
-  send_.clear();
+  part_.clear();
   for (int k = 0; k < part.cells[2]; ++k)
     for (int j = 0; j < part.cells[1]; ++j)
-      for (int i = 0; i < part.cells[0]; ++i) send_.push_back(static_cast<double>(part.b[part.index(i, j, k)]));
-  const std::vector<double> all = decomposition_.comm().gather_all(send_);
+      for (int i = 0; i < part.cells[0]; ++i) part_.push_back(static_cast<double>(part.b[part.index(i, j, k)]));
+  const std::vector<double> all = decomposition_.comm().gather_all(part_);
   for (std::size_t n = 0; n < order_.size(); ++n) whole.b[order_[n]] = static_cast<float>(all[n]);
 }
 

@@ -45,7 +45,7 @@ class Multigrid {
     Int3 cells{}, global{};  // of this rank and of the box; the same once gathered
     Int3 joined{1, 1, 1};    // cells of this level in one of the next
     int lines = -1;          // direction of the lines that are smoothed as a whole; -1: single cells are
-    int half_sweeps = 0;     // of the smoothing before the coarse correction, and as many after it
+    int half_sweeps = 0;     // of the smoothing before the coarse correction, and as many after it; at least two
     Int3 place{};            // of this rank's block
     int parity = 0;          // of its first cell
     std::array<Edges, 3> edges;
@@ -89,7 +89,7 @@ class Multigrid {
   void cycle(std::size_t l);
   void gather(const Level& part, Level& whole);
   static void take_part(const Level& whole, Level& part);
-  void fill_ghosts(Level& level);
+  void fill_ghosts(Level& level, int colour);
   void start(Level& level);
   void relax(Level& level, int colour);
   void relax_lines(Level& level, int colour);
@@ -119,7 +119,8 @@ class Multigrid {
   std::vector<float> solution_, inverse_;  // of its matrix, symmetric: a row for each
   std::vector<double> matrix_, diagonal_, pivot_row_;
   std::vector<float> row_;
-  std::vector<double> send_, receive_;
+  std::vector<double> part_;  // of a level to be gathered
+  std::array<std::vector<float>, 2> send_, receive_;
 };
 
 }  // namespace bedflow

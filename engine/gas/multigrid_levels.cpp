@@ -292,14 +292,14 @@ void Multigrid::invert_coarsest() {
 
 // Both faces a cell and direction, for the last face of the box is no cell's lower one.
 void Multigrid::gather_couplings(const Level& from, Level& to) {
-  send_.clear();
+  part_.clear();
   for (int k = 0; k < from.cells[2]; ++k)
     for (int j = 0; j < from.cells[1]; ++j)
       for (int i = 0; i < from.cells[0]; ++i)
         for (int d = 0; d < 3; ++d)
           for (int side = 0; side < 2; ++side)
-            send_.push_back(static_cast<double>(from.coupling[d][from.index(i, j, k) + side * from.stride(d)]));
-  const std::vector<double> all = decomposition_.comm().gather_all(send_);
+            part_.push_back(static_cast<double>(from.coupling[d][from.index(i, j, k) + side * from.stride(d)]));
+  const std::vector<double> all = decomposition_.comm().gather_all(part_);
   const double* next = all.data();
   for (const std::ptrdiff_t c : order_)
     for (int d = 0; d < 3; ++d)

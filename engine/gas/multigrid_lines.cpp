@@ -77,7 +77,6 @@ void Multigrid::factor_lines(Level& level) const {
 
 void Multigrid::relax_lines(Level& level, int colour) {
   constexpr float over = 1.1f;
-  fill_ghosts(level);
   const int along = level.lines, other = 3 - along, n = level.cells[0];  // lines that stand beside each other along x at once
   const std::ptrdiff_t s = level.stride(along), sy = level.stride(1), sz = level.stride(2);
   const float *cx = level.coupling[0].data(), *cy = level.coupling[1].data(), *cz = level.coupling[2].data();

@@ -15,19 +15,24 @@ Halo::Slab Halo::slab(int d, int from, int to) const {
   return result;
 }
 
-void Halo::pack(const Field& field, const Slab& slab) {
-  send_.clear();
+template <class Act>
+void Halo::for_slab(Field& field, const Slab& slab, std::vector<double>& message, Act act) {
+  const int n = slab.width(0);
+  double* values = message.data();
   for (int k = slab.low[2]; k < slab.high[2]; ++k)
-    for (int j = slab.low[1]; j < slab.high[1]; ++j)
-      for (int i = slab.low[0]; i < slab.high[0]; ++i) send_.push_back(field(i, j, k));
+    for (int j = slab.low[1]; j < slab.high[1]; ++j, values += n) act(&field(slab.low[0], j, k), n, values);
 }
 
-template <class Apply>
-void Halo::unpack(Field& field, const Slab& slab, Apply apply) {
-  const double* value = receive_.data();
-  for (int k = slab.low[2]; k < slab.high[2]; ++k)
-    for (int j = slab.low[1]; j < slab.high[1]; ++j)
-      for (int i = slab.low[0]; i < slab.high[0]; ++i) apply(field(i, j, k), *value++);
+// What stands in send[s] goes to the neighbour on side s, and what that one sends here waits in receive_[s].
+void Halo::exchange(Field& field, int d, const std::array<Slab, 2>& send, const std::array<Slab, 2>& receive) {
+  const std::array<int, 2> neighbours = {decomposition_.neighbour(d, 0), decomposition_.neighbour(d, 1)};
+  for (int side = 0; side < 2; ++side) {
+    if (neighbours[side] < 0) continue;
+    send_[side].resize(send[side].size());
+    receive_[side].resize(receive[side].size());
+    for_slab(field, send[side], send_[side], [](const double* here, int n, double* out) { std::copy_n(here, n, out); });
+  }
+  decomposition_.comm().exchange(neighbours, send_, receive_);
 }
 
 // A block that is its own neighbour across a periodic face: ghost layer l stands for layer l mod n, however few there are.
@@ -54,13 +59,12 @@ void Halo::fill(Field& field) {
       each_own_image(d, [data = field.data()](std::ptrdiff_t ghost, std::ptrdiff_t owner) { data[ghost] = data[owner]; });
       continue;
     }
-    for (int side = 0; side < 2; ++side) {  // send towards `side`, receive from the other
-      const int to = decomposition_.neighbour(d, side), from = decomposition_.neighbour(d, 1 - side);
-      const Slab source = side == 0 ? slab(d, 0, g) : slab(d, n - g, n);
-      const Slab target = side == 0 ? slab(d, n, n + g) : slab(d, -g, 0);
-      if (to >= 0) pack(field, source);
-      decomposition_.comm().exchange(to, to >= 0 ? send_ : std::vector<double>(), from, receive_);
-      if (from >= 0) unpack(field, target, [](double& here, double there) { here = there; });
+    const std::array ghosts = {slab(d, -g, 0), slab(d, n, n + g)};
+    exchange(field, d, {slab(d, 0, g), slab(d, n - g, n)}, ghosts);
+    for (int side = 0; side < 2; ++side) {
+      if (decomposition_.neighbour(d, side) < 0) continue;
+      for_slab(field, ghosts[side], receive_[side],
+               [](double* here, int m, const double* there) { std::copy_n(there, m, here); });
     }
   }
 }
@@ -78,18 +82,14 @@ void Halo::add(Field& field) {
       });
       continue;
     }
+    const std::array ghosts = {slab(d, -g, 0), slab(d, n, n + g)}, owners = {slab(d, 0, g), slab(d, n - g, n)};
+    exchange(field, d, ghosts, owners);
     for (int side = 0; side < 2; ++side) {
-      const int to = decomposition_.neighbour(d, side), from = decomposition_.neighbour(d, 1 - side);
-      const Slab source = side == 0 ? slab(d, -g, 0) : slab(d, n, n + g);
-      const Slab target = side == 0 ? slab(d, n - g, n) : slab(d, 0, g);
-      if (to >= 0) pack(field, source);
-      decomposition_.comm().exchange(to, to >= 0 ? send_ : std::vector<double>(), from, receive_);
-      if (to >= 0) {
-        for (int k = source.low[2]; k < source.high[2]; ++k)
-          for (int j = source.low[1]; j < source.high[1]; ++j)
-            for (int i = source.low[0]; i < source.high[0]; ++i) field(i, j, k) = 0;
-      }
-      if (from >= 0) unpack(field, target, [](double& here, double there) { here += there; });
+      if (decomposition_.neighbour(d, side) < 0) continue;
+      for_slab(field, ghosts[side], send_[side], [](double* here, int m, const double* /*sent*/) { std::fill_n(here, m, 0.0); });
+      for_slab(field, owners[side], receive_[side], [](double* here, int m, const double* there) {
+        for (int i = 0; i < m; ++i) here[i] += there[i];
+      });
     }
   }
 }

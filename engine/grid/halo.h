@@ -27,19 +27,22 @@ class Halo {
  private:
   struct Slab {
     Int3 low, high;
+    int width(int d) const { return high[d] - low[d]; }
+    std::size_t size() const { return static_cast<std::size_t>(width(0)) * width(1) * width(2); }
   };
   bool own_neighbour(int d) const { return decomposition_.neighbour(d, 0) == decomposition_.comm().rank(); }
   template <class Apply>
   void each_own_image(int d, Apply apply) const;
   Slab slab(int d, int from, int to) const;
-  void pack(const Field& field, const Slab& slab);
-  template <class Apply>
-  void unpack(Field& field, const Slab& slab, Apply apply);
+  // Act(values of a row of the slab, how many, the same in the message)
+  template <class Act>
+  static void for_slab(Field& field, const Slab& slab, std::vector<double>& message, Act act);
+  void exchange(Field& field, int d, const std::array<Slab, 2>& send, const std::array<Slab, 2>& receive);
 
   const Decomposition& decomposition_;
   const Grid& grid_;
   PhaseTimer& timer_;
-  std::vector<double> send_, receive_;
+  std::array<std::vector<double>, 2> send_, receive_;
 };
 
 }  // namespace bedflow

@@ -20,6 +20,7 @@ struct Comm::Handle {
 namespace {
 
 constexpr int tag = 1;
+constexpr std::array<int, 2> towards = {2, 3};  // tags of what is sent to one side and the other
 
 // Counts what MPI takes while it lives.
 class Counted {
@@ -197,16 +198,28 @@ void Comm::exchange(int to, std::span<const double> send, int from, std::vector<
   }
   MPI_Wait(&request, MPI_STATUS_IGNORE);
 }
-void Comm::exchange(int to, std::span<const double> send, int from, std::span<double> receive) const {
-  if (to == rank_ && from == rank_) {
-    std::copy(send.begin(), send.end(), receive.begin());
+void Comm::exchange_bytes(std::array<int, 2> neighbours, std::array<std::span<const std::byte>, 2> send,
+                          std::array<std::span<std::byte>, 2> receive) const {
+  if (neighbours[0] == rank_) {  // and so is the other
+    for (int side = 0; side < 2; ++side) std::copy(send[side].begin(), send[side].end(), receive[1 - side].begin());
     return;
   }
   if (size_ == 1) return;
-  const Counted counted = message(handle_->traffic, to, send.size_bytes());
-  MPI_Sendrecv(send.data(), static_cast<int>(send.size()), MPI_DOUBLE, to < 0 ? MPI_PROC_NULL : to, tag, receive.data(),
-               static_cast<int>(receive.size()), MPI_DOUBLE, from < 0 ? MPI_PROC_NULL : from, tag, handle_->comm,
-               MPI_STATUS_IGNORE);
+  const Counted counted(handle_->traffic);
+  std::array<MPI_Request, 4> requests;
+  requests.fill(MPI_REQUEST_NULL);
+  for (int side = 0; side < 2; ++side) {
+    if (neighbours[side] < 0) continue;
+    MPI_Irecv(receive[side].data(), static_cast<int>(receive[side].size()), MPI_BYTE, neighbours[side], towards[1 - side],
+              handle_->comm, &requests[side]);
+  }
+  for (int side = 0; side < 2; ++side) {
+    if (neighbours[side] < 0) continue;
+    ++handle_->traffic.messages, handle_->traffic.bytes += send[side].size();
+    MPI_Isend(send[side].data(), static_cast<int>(send[side].size()), MPI_BYTE, neighbours[side], towards[side], handle_->comm,
+              &requests[2 + side]);
+  }
+  MPI_Waitall(4, requests.data(), MPI_STATUSES_IGNORE);
 }
 
 std::vector<std::vector<double>> Comm::exchange_all(const std::vector<std::vector<double>>& messages) const {

@@ -2,6 +2,7 @@
 // comm.cpp.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -70,8 +71,14 @@ class Comm {
   // Sends one message and receives one of any length. rank -1: nobody there, nothing sent or received.
   // To and from itself it copies.
   void exchange(int to, std::span<const double> send, int from, std::vector<double>& receive) const;
-  // The same where the length of what comes is known: receive has it.
-  void exchange(int to, std::span<const double> send, int from, std::span<double> receive) const;
+  // With the ranks on both sides at once, where lengths are known: send[s] goes to neighbours[s], receive[s] comes from there.
+  // They may be the same rank; what is sent towards one side is received from the other.
+  template <class T>
+  void exchange(std::array<int, 2> neighbours, const std::array<std::vector<T>, 2>& send,
+                std::array<std::vector<T>, 2>& receive) const {
+    exchange_bytes(neighbours, {std::as_bytes(std::span(send[0])), std::as_bytes(std::span(send[1]))},
+                   {std::as_writable_bytes(std::span(receive[0])), std::as_writable_bytes(std::span(receive[1]))});
+  }
   // Sends messages[r] to each rank r and returns what each rank sent here, in rank order.
   std::vector<std::vector<double>> exchange_all(const std::vector<std::vector<double>>& messages) const;
 
@@ -83,6 +90,8 @@ class Comm {
  private:
   struct Handle;
   Comm(std::shared_ptr<Handle> handle, int rank, int size);
+  void exchange_bytes(std::array<int, 2> neighbours, std::array<std::span<const std::byte>, 2> send,
+                      std::array<std::span<std::byte>, 2> receive) const;
   std::shared_ptr<Handle> handle_;
   int rank_ = 0;
   int size_ = 1;

@@ -48,16 +48,19 @@ void GhostExchange::choose(std::vector<Vec3>& place, std::vector<std::int64_t>& 
   shift_.clear();
   for (int d = 0; d < 3; ++d) {
     const std::size_t candidates = place.size();  // what comes in this direction is not sent back in it
-    for (int side = 0; side < 2; ++side) pass(d, side, owned, place, id, candidates);
+    Stage& stage = stages_.emplace_back();
+    stage.neighbours = {decomposition_.neighbour(d, 0), decomposition_.neighbour(d, 1)};
+    for (int side = 0; side < 2; ++side) pass(stage, d, side, owned, place, id, candidates);
+    if (stage.neighbours[0] < 0 && stage.neighbours[1] < 0) stages_.pop_back();
   }
 }
 
-void GhostExchange::pass(int d, int side, std::size_t owned, std::vector<Vec3>& place, std::vector<std::int64_t>& id,
-                         std::size_t candidates) {
-  Stage stage{decomposition_.neighbour(d, side), decomposition_.neighbour(d, 1 - side), {}, place.size(), 0};
-  if (stage.to < 0 && stage.from < 0) return;
-  send_.clear();
-  if (stage.to >= 0) {
+// Sends towards `side`, receives from the other.
+void GhostExchange::pass(Stage& stage, int d, int side, std::size_t owned, std::vector<Vec3>& place,
+                         std::vector<std::int64_t>& id, std::size_t candidates) {
+  const int to = stage.neighbours[side], from = stage.neighbours[1 - side];
+  chosen_.clear();
+  if (to >= 0) {
     const double wrap = decomposition_.wraps(d, side) ? (side == 0 ? 1 : -1) * decomposition_.size()[d] : 0;
     const double low = decomposition_.low()[d] + reach_, high = decomposition_.high()[d] - reach_;
     for (std::size_t i = 0; i < candidates; ++i) {
@@ -65,39 +68,44 @@ void GhostExchange::pass(int d, int side, std::size_t owned, std::vector<Vec3>& 
       const double x = place[i][d] + shift[d];
       if (side == 0 ? x >= low : x < high) continue;
       shift[d] += wrap;
-      stage.send.push_back(static_cast<std::uint32_t>(i));
-      send_.push_back(std::bit_cast<double>(id[i]));
-      put(send_, place[i]);
-      put(send_, shift);
+      stage.send[side].push_back(static_cast<std::uint32_t>(i));
+      chosen_.push_back(std::bit_cast<double>(id[i]));
+      put(chosen_, place[i]);
+      put(chosen_, shift);
     }
   }
-  decomposition_.comm().exchange(stage.to, send_, stage.from, receive_);
-  stage.count = receive_.size() / row_length;
-  for (std::size_t i = 0; i < stage.count; ++i) {
-    const double* row = receive_.data() + i * row_length;
+  decomposition_.comm().exchange(to, chosen_, from, come_);
+  const std::size_t count = come_.size() / row_length;
+  stage.first[1 - side] = place.size();
+  stage.count[1 - side] = count;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double* row = come_.data() + i * row_length;
     id.push_back(std::bit_cast<std::int64_t>(row[0]));
     place.push_back({row[1], row[2], row[3]});
     shift_.push_back({row[4], row[5], row[6]});
   }
-  stages_.push_back(std::move(stage));
 }
 
 void GhostExchange::forward(std::span<const Column> columns) {
   std::size_t width = 0;
   for (const Column& column : columns) width += column.width;
   for (const Stage& stage : stages_) {
-    send_.resize(stage.send.size() * width);
-    receive_.resize(stage.count * width);
-    double* out = send_.data();
-    for (const std::uint32_t i : stage.send)
-      for (const Column& column : columns) out = std::copy_n(column.data + i * column.stride, column.width, out);
-    decomposition_.comm().exchange(stage.to, send_, stage.from, std::span(receive_));
-    const double* in = receive_.data();
-    for (std::size_t i = stage.first; i < stage.first + stage.count; ++i)
-      for (const Column& column : columns) {
-        std::copy_n(in, column.width, column.data + i * column.stride);
-        in += column.width;
-      }
+    for (int side = 0; side < 2; ++side) {
+      send_[side].resize(stage.send[side].size() * width);
+      receive_[side].resize(stage.count[side] * width);
+      double* out = send_[side].data();
+      for (const std::uint32_t i : stage.send[side])
+        for (const Column& column : columns) out = std::copy_n(column.data + i * column.stride, column.width, out);
+    }
+    decomposition_.comm().exchange(stage.neighbours, send_, receive_);
+    for (int side = 0; side < 2; ++side) {
+      const double* in = receive_[side].data();
+      for (std::size_t i = stage.first[side]; i < stage.first[side] + stage.count[side]; ++i)
+        for (const Column& column : columns) {
+          std::copy_n(in, column.width, column.data + i * column.stride);
+          in += column.width;
+        }
+    }
   }
 }
 

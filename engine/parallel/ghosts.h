@@ -35,18 +35,20 @@ class GhostExchange {
   const std::vector<Vec3>& shifts() const { return shift_; }
 
  private:
-  struct Stage {
-    int to, from;
-    std::vector<std::uint32_t> send;  // rows
-    std::size_t first, count;         // rows received
+  struct Stage {  // of a direction, by the side
+    std::array<int, 2> neighbours{};
+    std::array<std::vector<std::uint32_t>, 2> send;  // rows
+    std::array<std::size_t, 2> first{}, count{};     // rows received
   };
-  void pass(int d, int side, std::size_t owned, std::vector<Vec3>& place, std::vector<std::int64_t>& id, std::size_t candidates);
+  void pass(Stage& stage, int d, int side, std::size_t owned, std::vector<Vec3>& place, std::vector<std::int64_t>& id,
+            std::size_t candidates);
 
   const Decomposition& decomposition_;
   double reach_;
   std::vector<Stage> stages_;
   std::vector<Vec3> shift_;
-  std::vector<double> send_, receive_;
+  std::vector<double> chosen_, come_;
+  std::array<std::vector<double>, 2> send_, receive_;
 };
 
 }  // namespace bedflow

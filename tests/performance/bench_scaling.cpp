@@ -121,9 +121,11 @@ json messages(const Comm& comm) {
   const int other = comm.size() - 1 - comm.rank();
   json result;
   for (const std::size_t length : {1, 64, 1024, 8192, 65536}) {
-    const std::vector<double> send(length, 1.0);
-    std::vector<double> receive(length);
-    const double seconds = best_time(comm, 2000, [&] { comm.exchange(other, send, other, std::span(receive)); });
+    const std::vector<double> values(length, 1.0);
+    const std::array send = {values, values};
+    std::array receive = send;
+    const std::array<int, 2> neighbours = comm.root() ? std::array{-1, other} : std::array{other, -1};
+    const double seconds = best_time(comm, 2000, [&] { comm.exchange(neighbours, send, receive); });
     result["exchange"].push_back({{"bytes", 8 * length}, {"seconds", seconds}});
   }
   result["reduction"] = best_time(comm, 2000, [&] { comm.max(std::int64_t{1}); });

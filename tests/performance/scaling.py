@@ -3,13 +3,14 @@ predicts up to 10 000.
 
 A bed is cut into columns a × b of its whole height. The busiest column takes, a sub-step,
 
-    T = B n c + g (list + pack) + κ g contact + max(Σ_sides (latency + bytes g / (sides bandwidth)), log2(P) reduction)
+    T = B n c + g (list + pack) + κ g contact + max(m latency + bytes g / bandwidth, log2(P) reduction)
 
     n, g    particles it owns, ghosts: g = ρ ((a + kx r)(b + kz r) − a b) with ρ particles over plan area, r the reach of the
             list and kx, kz = 0, 1, 2 the sides across which there is a neighbour
     c       seconds of a particle and sub-step where all cores are busy (each rank with a bed to itself)
     B       particles of the fullest rank over the mean
     κ       contacts across per ghost; each is computed on both sides
+    m       directions in which there is a neighbour: both sides pass at once
     max     the ranks agree while the ghosts pass
     list, pack, contact   seconds of the list per particle, of packing a ghost, of a contact
 
@@ -103,9 +104,9 @@ class Model:
 
     def time(self, ranks, column, sides, balance, network):
         """Seconds of a sub-step, and of it what is communication."""
-        owned, ghosts, messages = self.density * column[0] * column[1], self.ghosts(column, sides), sum(sides)
+        owned, ghosts, passes = self.density * column[0] * column[1], self.ghosts(column, sides), sum(k > 0 for k in sides)
         work = balance * owned * self.particle + ghosts * (self.list + self.pack + self.across * self.contact)
-        talk = messages * network["latency"] + (self.bytes * ghosts / network["bandwidth"] if messages else 0)
+        talk = passes * network["latency"] + (self.bytes * ghosts / network["bandwidth"] if passes else 0)
         talk = max(talk, math.log2(ranks) * network["reduction"])
         return work + talk, talk
 

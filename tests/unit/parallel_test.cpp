@@ -168,11 +168,12 @@ TEST(Comm, AMaximumIsUnderWayWhileExchangesPass) {
   const Comm world = Comm::world();
   for (int round = 0; round < 100; ++round) {
     world.begin_max(round % world.size() == world.rank() ? round : -1);
-    const std::vector<double> send(8, world.rank());
-    std::vector<double> receive(8);
+    const std::vector<double> ours(8, world.rank());
+    std::array<std::vector<double>, 2> receive = {ours, ours};
     const int next = (world.rank() + 1) % world.size(), before = (world.rank() + world.size() - 1) % world.size();
-    world.exchange(next, send, before, std::span(receive));
-    EXPECT_EQ(receive.front(), before);
+    world.exchange({before, next}, {ours, ours}, receive);
+    EXPECT_EQ(receive[0].front(), before);
+    EXPECT_EQ(receive[1].front(), next);
     EXPECT_EQ(world.end_max(), round);
   }
 }
