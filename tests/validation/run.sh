@@ -57,6 +57,8 @@ for what in "$@"; do
         --vary displacement=true,false --reference displacement=true \
         --vary substeps=20,40,100 --reference substeps=20 \
         --vary kernel=hat,square_dpvm,gaussian --reference kernel=hat
+      goldschmidt "gas step" --vary substeps=1,5,10,20,40,100,200 --reference substeps=20 \
+        --vary tolerance=x0.1,x1,x10 --reference tolerance=x1
       ;;
     fidelity)
       bedflow study mueller --name "mueller: fidelity" --vary fidelity=FAST,BALANCED,REFERENCE --reference fidelity=REFERENCE \
