@@ -101,9 +101,15 @@ void verify_file(const std::filesystem::path& file) {
     return say("not verified: bedflow-reader is not beside bedflow");
   }
   const auto result = run_child({reader.string(), "--seconds", "3600", "verify", file.string()});
-  if (result.exit_code != 0 || !result.out.empty())
-    throw Failure(Exit::corrupt, "the file " + file.string() + " is damaged: " + result.out + result.error,
-                  "bedflow checkpoint verify");
+  const std::string faults = result.out + result.error;
+  if (result.exit_code == v1::CHECKPOINT_CORRUPT || !result.out.empty())
+    throw Failure(Exit::corrupt, "the file " + file.string() + " is damaged: " + faults, "bedflow checkpoint verify");
+  if (result.exit_code != 0) {
+    throw Failure(Exit::other,
+                  "the file " + file.string() + " came over whole but is not verified: bedflow-reader " +
+                      (faults.empty() ? "ended by exit code " + std::to_string(result.exit_code) : "said " + faults),
+                  reader.string() + " verify " + file.string());
+  }
 }
 
 Exit download(const Program& program, const DownloadOptions& options) {

@@ -37,8 +37,9 @@ void require_sound(const v1::Token& token) {
   if (token.owner() == local_owner) wrong("token.owner is 'local': that is whoever may open the server's socket");
   if (token.scope() == v1::SCOPE_NONE) wrong("token.scope is missing; there are READ, SUBMIT and ADMIN");
   if (token.secret_sha256().size() != 32) wrong("token.secret_sha256 is not 32 bytes");
-  const std::chrono::nanoseconds left(token.expires_unix_nanos() - now_nanos());
-  if (left <= left.zero() || left > longest_life) wrong("token.expires_unix_nanos is not between now and ten years from now");
+  const std::int64_t now = now_nanos(), expires = token.expires_unix_nanos();
+  if (expires <= now || std::chrono::nanoseconds(expires - now) > longest_life)
+    wrong("token.expires_unix_nanos is not between now and ten years from now");
 }
 
 [[noreturn]] void refuse_ended(const std::string& id) {

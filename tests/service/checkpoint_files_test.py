@@ -1,6 +1,8 @@
 """Checkpoints looked at, verified, and carried away in parts, on the real server."""
 import json
 import pathlib
+import shutil
+import subprocess
 import tempfile
 import unittest
 
@@ -8,7 +10,7 @@ import bedflow
 import h5py
 from bedflow.checksum import crc32c
 from bedflow.v1 import service_pb2
-from real_server import CROWD, RealServer, bed
+from real_server import BIN, CROWD, RealServer, bed
 
 
 def setUpModule():
@@ -122,6 +124,17 @@ class Checkpoints(unittest.TestCase):
         done = server.client("checkpoint", "download", self.job.id, "-o", scratch / "damaged.h5")
         self.assertEqual(done.returncode, 11, done.stderr)
         self.assertIn("particles/position block 1", done.stderr)
+
+    def test_a_reader_that_dies_has_not_found_damage(self):
+        alone = pathlib.Path(tempfile.mkdtemp(dir=scratch))
+        program, reader = pathlib.Path(shutil.copy(BIN / "bedflow", alone)), alone / "bedflow-reader"
+        reader.write_text("#!/bin/sh\nkill -9 $$\n")
+        reader.chmod(0o755)
+        done = subprocess.run([program, "checkpoint", "download", self.job.id, "-o", alone / "bed.h5", "--server", server.address],
+                              capture_output=True, text=True, timeout=60)
+        self.assertEqual(done.returncode, 1, done.stderr)
+        self.assertIn("is not verified: bedflow-reader ended by exit code 137", done.stderr)
+        self.assertEqual((alone / "bed.h5").read_bytes(), self.bytes)
 
 
 class Running(unittest.TestCase):
