@@ -44,7 +44,7 @@ void Multigrid::cycle(std::size_t l) {
     relax(level, colour);
   };
   for (int n = 1; n < level.half_sweeps; ++n) relax_anew(n % 2);
-  fill_ghosts(level, (level.half_sweeps - 1) % 2);
+  fill_ghosts(level, (level.half_sweeps - 1) % 2);  // the other colour's are right since the last half sweep
   restrict_residual(level, next);
   cycle(l + 1);
   prolong(next, level);
@@ -172,8 +172,8 @@ void Multigrid::fill_ghosts(Level& level, int colour) {
     const std::ptrdiff_t s1 = level.stride(t1), s2 = level.stride(t2);
     const bool all = level.lines >= 0 || (periodic(d) && level.global[d] % 2 == 1);
     const int step = all ? 1 : 2;
-    const auto skipped = [&](int at) { return all ? 0 : (at + level.parity + colour) & 1; };  // cells before the first to pass
-    const auto passing = [&](int at) { return static_cast<std::size_t>((n1 * n2 + step - 1 - skipped(at)) / step); };
+    const auto length =
+        static_cast<std::size_t>((n1 * n2 + step - 1) / step);  // of a message; of one colour there may be one less
     // Act(cell that passes, its number), for layer `at`, of this block or the one beside.
     const auto for_layer = [&](int at, auto act) {
       Int3 corner{0, 0, 0};
@@ -181,13 +181,13 @@ void Multigrid::fill_ghosts(Level& level, int colour) {
       float* layer = level.x.data() + level.index(corner[0], corner[1], corner[2]);
       std::size_t m = 0;
       for (int b = 0; b < n2; ++b)
-        for (int a = skipped(at + b); a < n1; a += step) act(layer[a * s1 + b * s2], m++);
+        for (int a = all ? 0 : (at + b + level.parity + colour) & 1; a < n1; a += step) act(layer[a * s1 + b * s2], m++);
     };
     const std::array<int, 2> ghosts = {-1, level.cells[d]}, owners = {0, level.cells[d] - 1};
     for (int side = 0; side < 2; ++side) {
       if (neighbours[side] < 0) continue;
-      send_[side].resize(passing(owners[side]));
-      receive_[side].resize(passing(ghosts[side]));
+      send_[side].resize(length);
+      receive_[side].resize(length);
       for_layer(owners[side], [out = send_[side].data()](float here, std::size_t m) { out[m] = here; });
     }
     decomposition_.comm().exchange(neighbours, send_, receive_);

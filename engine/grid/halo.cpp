@@ -1,5 +1,7 @@
 #include "grid/halo.h"
 
+#include <algorithm>
+
 namespace bedflow {
 
 Halo::Halo(const Decomposition& decomposition, const Grid& grid, PhaseTimer& timer)
@@ -15,24 +17,34 @@ Halo::Slab Halo::slab(int d, int from, int to) const {
   return result;
 }
 
+Halo::Sides Halo::owners(int d) const {
+  return {slab(d, 0, grid_.ghosts), slab(d, grid_.cells[d] - grid_.ghosts, grid_.cells[d])};
+}
+Halo::Sides Halo::ghosts(int d) const {
+  return {slab(d, -grid_.ghosts, 0), slab(d, grid_.cells[d], grid_.cells[d] + grid_.ghosts)};
+}
+
 template <class Act>
 void Halo::for_slab(Field& field, const Slab& slab, std::vector<double>& message, Act act) {
   const int n = slab.width(0);
+  message.resize(slab.size());
   double* values = message.data();
   for (int k = slab.low[2]; k < slab.high[2]; ++k)
-    for (int j = slab.low[1]; j < slab.high[1]; ++j, values += n) act(&field(slab.low[0], j, k), n, values);
+    for (int j = slab.low[1]; j < slab.high[1]; ++j, values += n) act(&field(slab.low[0], j, k), values, n);
 }
 
-// What stands in send[s] goes to the neighbour on side s, and what that one sends here waits in receive_[s].
-void Halo::exchange(Field& field, int d, const std::array<Slab, 2>& send, const std::array<Slab, 2>& receive) {
+// What is taken of from[s] goes to the neighbour on side s, and what that one sends is given to to[s].
+template <class Take, class Give>
+void Halo::exchange(Field& field, int d, const Sides& from, const Sides& to, Take take, Give give) {
   const std::array<int, 2> neighbours = {decomposition_.neighbour(d, 0), decomposition_.neighbour(d, 1)};
   for (int side = 0; side < 2; ++side) {
     if (neighbours[side] < 0) continue;
-    send_[side].resize(send[side].size());
-    receive_[side].resize(receive[side].size());
-    for_slab(field, send[side], send_[side], [](const double* here, int n, double* out) { std::copy_n(here, n, out); });
+    for_slab(field, from[side], send_[side], take);
+    receive_[side].resize(to[side].size());
   }
   decomposition_.comm().exchange(neighbours, send_, receive_);
+  for (int side = 0; side < 2; ++side)
+    if (neighbours[side] >= 0) for_slab(field, to[side], receive_[side], give);
 }
 
 // A block that is its own neighbour across a periodic face: ghost layer l stands for layer l mod n, however few there are.
@@ -50,29 +62,21 @@ void Halo::each_own_image(int d, Apply apply) const {
 }
 
 void Halo::fill(Field& field) {
-  const int g = grid_.ghosts;
   for (int d = 0; d < 3; ++d) {
-    const int n = grid_.cells[d];
     if (decomposition_.at_face(d, 0) && decomposition_.at_face(d, 1)) continue;
     const PhaseTimer::Scope scope(timer_, Phase::halo);
     if (own_neighbour(d)) {
       each_own_image(d, [data = field.data()](std::ptrdiff_t ghost, std::ptrdiff_t owner) { data[ghost] = data[owner]; });
       continue;
     }
-    const std::array ghosts = {slab(d, -g, 0), slab(d, n, n + g)};
-    exchange(field, d, {slab(d, 0, g), slab(d, n - g, n)}, ghosts);
-    for (int side = 0; side < 2; ++side) {
-      if (decomposition_.neighbour(d, side) < 0) continue;
-      for_slab(field, ghosts[side], receive_[side],
-               [](double* here, int m, const double* there) { std::copy_n(there, m, here); });
-    }
+    exchange(
+        field, d, owners(d), ghosts(d), [](const double* here, double* out, int n) { std::copy_n(here, n, out); },
+        [](double* here, const double* in, int n) { std::copy_n(in, n, here); });
   }
 }
 
 void Halo::add(Field& field) {
-  const int g = grid_.ghosts;
   for (int d = 2; d >= 0; --d) {
-    const int n = grid_.cells[d];
     if (decomposition_.at_face(d, 0) && decomposition_.at_face(d, 1)) continue;
     const PhaseTimer::Scope scope(timer_, Phase::halo);
     if (own_neighbour(d)) {
@@ -82,15 +86,15 @@ void Halo::add(Field& field) {
       });
       continue;
     }
-    const std::array ghosts = {slab(d, -g, 0), slab(d, n, n + g)}, owners = {slab(d, 0, g), slab(d, n - g, n)};
-    exchange(field, d, ghosts, owners);
-    for (int side = 0; side < 2; ++side) {
-      if (decomposition_.neighbour(d, side) < 0) continue;
-      for_slab(field, ghosts[side], send_[side], [](double* here, int m, const double* /*sent*/) { std::fill_n(here, m, 0.0); });
-      for_slab(field, owners[side], receive_[side], [](double* here, int m, const double* there) {
-        for (int i = 0; i < m; ++i) here[i] += there[i];
-      });
-    }
+    exchange(
+        field, d, ghosts(d), owners(d),
+        [](double* here, double* out, int n) {
+          std::copy_n(here, n, out);
+          std::fill_n(here, n, 0.0);
+        },
+        [](double* here, const double* in, int n) {
+          for (int i = 0; i < n; ++i) here[i] += in[i];
+        });
   }
 }
 

@@ -2,6 +2,7 @@
 // stands beyond them is the boundary condition's affair.
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "base/phase_timer.h"
@@ -33,11 +34,15 @@ class Halo {
   bool own_neighbour(int d) const { return decomposition_.neighbour(d, 0) == decomposition_.comm().rank(); }
   template <class Apply>
   void each_own_image(int d, Apply apply) const;
+  using Sides = std::array<Slab, 2>;
   Slab slab(int d, int from, int to) const;
-  // Act(values of a row of the slab, how many, the same in the message)
+  Sides owners(int d) const;  // the layers of this block that are ghosts of its neighbours
+  Sides ghosts(int d) const;
+  // Act(values of a row of the slab, the same in the message, how many)
   template <class Act>
   static void for_slab(Field& field, const Slab& slab, std::vector<double>& message, Act act);
-  void exchange(Field& field, int d, const std::array<Slab, 2>& send, const std::array<Slab, 2>& receive);
+  template <class Take, class Give>
+  void exchange(Field& field, int d, const Sides& from, const Sides& to, Take take, Give give);
 
   const Decomposition& decomposition_;
   const Grid& grid_;

@@ -212,9 +212,6 @@ void Comm::exchange_bytes(std::array<int, 2> neighbours, std::array<std::span<co
     if (neighbours[side] < 0) continue;
     MPI_Irecv(receive[side].data(), static_cast<int>(receive[side].size()), MPI_BYTE, neighbours[side], towards[1 - side],
               handle_->comm, &requests[side]);
-  }
-  for (int side = 0; side < 2; ++side) {
-    if (neighbours[side] < 0) continue;
     ++handle_->traffic.messages, handle_->traffic.bytes += send[side].size();
     MPI_Isend(send[side].data(), static_cast<int>(send[side].size()), MPI_BYTE, neighbours[side], towards[side], handle_->comm,
               &requests[2 + side]);

@@ -71,8 +71,8 @@ class Comm {
   // Sends one message and receives one of any length. rank -1: nobody there, nothing sent or received.
   // To and from itself it copies.
   void exchange(int to, std::span<const double> send, int from, std::vector<double>& receive) const;
-  // With the ranks on both sides at once, where lengths are known: send[s] goes to neighbours[s], receive[s] comes from there.
-  // They may be the same rank; what is sent towards one side is received from the other.
+  // With the ranks on both sides at once, where lengths are known: send[s] goes to neighbours[s], and receive[s], as long as what
+  // comes, is filled from there. -1: nobody. Both may be the same rank: what is sent towards one side comes from the other.
   template <class T>
   void exchange(std::array<int, 2> neighbours, const std::array<std::vector<T>, 2>& send,
                 std::array<std::vector<T>, 2>& receive) const {

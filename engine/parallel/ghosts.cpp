@@ -43,23 +43,24 @@ GhostExchange::GhostExchange(const Decomposition& decomposition, double reach) :
 }
 
 void GhostExchange::choose(std::vector<Vec3>& place, std::vector<std::int64_t>& id) {
-  const std::size_t owned = place.size();
   stages_.clear();
   shift_.clear();
   for (int d = 0; d < 3; ++d) {
+    if (decomposition_.at_face(d, 0) && decomposition_.at_face(d, 1)) continue;
     const std::size_t candidates = place.size();  // what comes in this direction is not sent back in it
     Stage& stage = stages_.emplace_back();
     stage.neighbours = {decomposition_.neighbour(d, 0), decomposition_.neighbour(d, 1)};
-    for (int side = 0; side < 2; ++side) pass(stage, d, side, owned, place, id, candidates);
-    if (stage.neighbours[0] < 0 && stage.neighbours[1] < 0) stages_.pop_back();
+    for (int side = 0; side < 2; ++side) pass(stage, d, side, candidates, place, id);
   }
 }
 
 // Sends towards `side`, receives from the other.
-void GhostExchange::pass(Stage& stage, int d, int side, std::size_t owned, std::vector<Vec3>& place,
-                         std::vector<std::int64_t>& id, std::size_t candidates) {
+void GhostExchange::pass(Stage& stage, int d, int side, std::size_t candidates, std::vector<Vec3>& place,
+                         std::vector<std::int64_t>& id) {
   const int to = stage.neighbours[side], from = stage.neighbours[1 - side];
-  chosen_.clear();
+  const std::size_t owned = place.size() - shift_.size();
+  std::vector<double>&message = send_[side], &come = receive_[1 - side];
+  message.clear();
   if (to >= 0) {
     const double wrap = decomposition_.wraps(d, side) ? (side == 0 ? 1 : -1) * decomposition_.size()[d] : 0;
     const double low = decomposition_.low()[d] + reach_, high = decomposition_.high()[d] - reach_;
@@ -69,17 +70,17 @@ void GhostExchange::pass(Stage& stage, int d, int side, std::size_t owned, std::
       if (side == 0 ? x >= low : x < high) continue;
       shift[d] += wrap;
       stage.send[side].push_back(static_cast<std::uint32_t>(i));
-      chosen_.push_back(std::bit_cast<double>(id[i]));
-      put(chosen_, place[i]);
-      put(chosen_, shift);
+      message.push_back(std::bit_cast<double>(id[i]));
+      put(message, place[i]);
+      put(message, shift);
     }
   }
-  decomposition_.comm().exchange(to, chosen_, from, come_);
-  const std::size_t count = come_.size() / row_length;
+  decomposition_.comm().exchange(to, message, from, come);
+  const std::size_t count = come.size() / row_length;
   stage.first[1 - side] = place.size();
   stage.count[1 - side] = count;
   for (std::size_t i = 0; i < count; ++i) {
-    const double* row = come_.data() + i * row_length;
+    const double* row = come.data() + i * row_length;
     id.push_back(std::bit_cast<std::int64_t>(row[0]));
     place.push_back({row[1], row[2], row[3]});
     shift_.push_back({row[4], row[5], row[6]});

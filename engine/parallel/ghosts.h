@@ -5,6 +5,7 @@
 // is kept beside it. So both owners of a pair find the same difference of places, to the last bit.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -40,14 +41,12 @@ class GhostExchange {
     std::array<std::vector<std::uint32_t>, 2> send;  // rows
     std::array<std::size_t, 2> first{}, count{};     // rows received
   };
-  void pass(Stage& stage, int d, int side, std::size_t owned, std::vector<Vec3>& place, std::vector<std::int64_t>& id,
-            std::size_t candidates);
+  void pass(Stage& stage, int d, int side, std::size_t candidates, std::vector<Vec3>& place, std::vector<std::int64_t>& id);
 
   const Decomposition& decomposition_;
   double reach_;
   std::vector<Stage> stages_;
   std::vector<Vec3> shift_;
-  std::vector<double> chosen_, come_;
   std::array<std::vector<double>, 2> send_, receive_;
 };
 

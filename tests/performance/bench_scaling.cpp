@@ -124,7 +124,7 @@ json messages(const Comm& comm) {
     const std::vector<double> values(length, 1.0);
     const std::array send = {values, values};
     std::array receive = send;
-    const std::array<int, 2> neighbours = comm.root() ? std::array{-1, other} : std::array{other, -1};
+    const std::array<int, 2> neighbours = comm.rank() < other ? std::array{-1, other} : std::array{other, -1};
     const double seconds = best_time(comm, 2000, [&] { comm.exchange(neighbours, send, receive); });
     result["exchange"].push_back({{"bytes", 8 * length}, {"seconds", seconds}});
   }

@@ -178,6 +178,20 @@ TEST(Comm, AMaximumIsUnderWayWhileExchangesPass) {
   }
 }
 
+TEST(Comm, WhatIsSentTowardsOneSideComesFromTheOther) {
+  const Comm world = Comm::world();
+  const int next = (world.rank() + 1) % world.size(), before = (world.rank() + world.size() - 1) % world.size();
+  const auto said = [](int rank, int side) { return std::vector<float>(3, static_cast<float>(2 * rank + side)); };
+  const Traffic earlier = world.traffic();
+  std::array<std::vector<float>, 2> receive = {std::vector<float>(3), std::vector<float>(3)};
+  world.exchange({before, next}, {said(world.rank(), 0), said(world.rank(), 1)}, receive);
+  EXPECT_EQ(receive[0], said(before, 1));
+  EXPECT_EQ(receive[1], said(next, 0));
+  const Traffic traffic = world.traffic() - earlier;
+  EXPECT_EQ(traffic.messages, world.size() > 1 ? 2 : 0);
+  EXPECT_EQ(traffic.bytes, world.size() > 1 ? 24 : 0);
+}
+
 TEST(Comm, RanksOfOneMachineAreOnOneMachine) {
   EXPECT_EQ(Comm::world().machines(), 1);
   EXPECT_EQ(Comm::self().machines(), 1);
